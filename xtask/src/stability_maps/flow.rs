@@ -1,6 +1,6 @@
 //! What is stable of flows: time schemes, stiff viscosity, pressure solvers, energy.
 
-use super::{Curve, NO_THEORY, Panel, logs};
+use super::{Curve, Limit, NO_THEORY, Panel, logs};
 use fixtures::failure::Failure;
 use num_complex::Complex;
 use std::f64::consts::{PI, TAU};
@@ -40,18 +40,25 @@ fn line(
 
 /// Amplitude of a wave of the wind across.
 fn amplitude(flow: &Flow, wave: usize) -> f64 {
-    let at = |(j, u): (usize, &f64)| u * Complex::cis(-TAU * (wave * j) as f64 / CELLS as f64);
-    flow.face_velocity_m_s(0)
-        .iter()
-        .enumerate()
-        .map(at)
-        .sum::<Complex<f64>>()
-        .norm()
+    let velocity_m_s = flow.face_velocity_m_s(0);
+    let terms = velocity_m_s.iter().enumerate().map(|(j, u)| {
+        let phase = -TAU * (wave * j) as f64 / CELLS as f64;
+        u * Complex::cis(phase)
+    });
+    terms.sum::<Complex<f64>>().norm()
 }
 
 /// The wave number that convection sees of a wave that turns by `theta` from one cell to the next, times the length of a cell.
 fn symbol(theta: f64) -> f64 {
     1.5 * theta.sin() - 0.3 * (2.0 * theta).sin() + (3.0 * theta).sin() / 30.0
+}
+
+/// Takes some steps.
+fn advance(flow: &mut Flow, steps: usize) -> Result<(), Failure> {
+    for _ in 0..steps {
+        flow.step()?;
+    }
+    Ok(())
 }
 
 /// Growth of the amplitude in a step, of a wave that turns by `angle` in a step, against the larger root of the scheme.
@@ -66,14 +73,12 @@ pub(super) fn growth() -> Result<Vec<Panel>, Failure> {
         Curve::new(name, angles, |angle| {
             let step_s = angle / symbol / CELLS as f64;
             let mut flow = line(scheme, 0.0, step_s, |y| (TAU * WAVE as f64 * y).sin())?;
-            (0..20).try_for_each(|_| flow.step().map(drop))?;
+            advance(&mut flow, 20)?;
             let before = amplitude(&flow, WAVE);
-            (0..40).try_for_each(|_| flow.step().map(drop))?;
-            let measured = ((amplitude(&flow, WAVE) / before).powf(1.0 / 40.0) - 1.0).abs();
-            Ok([
-                measured,
-                (root(scheme, Complex::new(0.0, angle), 0.0) - 1.0).abs(),
-            ])
+            advance(&mut flow, 40)?;
+            let growth = (amplitude(&flow, WAVE) / before).powf(1.0 / 40.0);
+            let expected = root(scheme, Complex::new(0.0, angle), 0.0);
+            Ok([(growth - 1.0).abs(), (expected - 1.0).abs()])
         })
     });
     let axes = logs(["angle in a step [rad]", "||G| − 1|"]);
@@ -89,35 +94,11 @@ pub(super) fn growth() -> Result<Vec<Panel>, Failure> {
 pub(super) fn limits() -> Result<Vec<Panel>, Failure> {
     let curves = SCHEMES.map(|(name, scheme)| {
         Curve::new(name, &[1e-3, 1e-2, 3e-2, 1e-1, 3e-1], |viscous| {
-            // nu = viscous h^2/dt, with dt = courant h.
-            let holds = |courant: f64| -> Result<bool, Failure> {
-                let (h, step_s) = (1.0 / CELLS as f64, courant / CELLS as f64);
-                let spike = |y: f64| {
-                    if (y * CELLS as f64).floor() == 7.0 {
-                        1.0
-                    } else {
-                        0.0
-                    }
-                };
-                let mut flow = line(scheme, viscous * h * h / step_s, step_s, spike)?;
-                let mut largest = || -> Result<Option<f64>, Failure> {
-                    for _ in 0..600 {
-                        // A refusal is an answer.
-                        let Ok(_) = flow.step() else { return Ok(None) };
-                    }
-                    Ok(Some(
-                        (1..=CELLS / 2)
-                            .map(|wave| amplitude(&flow, wave))
-                            .fold(0.0, f64::max),
-                    ))
-                };
-                let (first, last) = (largest()?, largest()?);
-                Ok(matches!((first, last), (Some(first), Some(last)) if last <= first))
-            };
-            let (mut low, mut high) = (0.05, 2.0);
+            let mut low = 0.05;
+            let mut high = 2.0;
             while high - low > 5e-4 * low {
                 let middle = 0.5 * (low + high);
-                if holds(middle)? {
+                if is_stable(scheme, viscous, middle)? {
                     low = middle
                 } else {
                     high = middle
@@ -133,38 +114,61 @@ pub(super) fn limits() -> Result<Vec<Panel>, Failure> {
     )?])
 }
 
+/// Whether no wave has grown from one span of steps to the next, with nu = viscous h^2/dt and dt = courant h.
+fn is_stable(scheme: TimeScheme, viscous: f64, courant: f64) -> Result<bool, Failure> {
+    let h = 1.0 / CELLS as f64;
+    let step_s = courant / CELLS as f64;
+    let mut flow = line(scheme, viscous * h * h / step_s, step_s, spike)?;
+    let first = largest_amplitude(&mut flow);
+    let last = largest_amplitude(&mut flow);
+    Ok(matches!((first, last), (Some(first), Some(last)) if last <= first))
+}
+
+/// One cell: waves of all lengths start alike.
+fn spike(y: f64) -> f64 {
+    if (y * CELLS as f64).floor() == 7.0 {
+        1.0
+    } else {
+        0.0
+    }
+}
+
+/// The largest amplitude of all waves after some steps; none if a step is refused, which is an answer.
+fn largest_amplitude(flow: &mut Flow) -> Option<f64> {
+    advance(flow, 600).ok()?;
+    let amplitudes = (1..=CELLS / 2).map(|wave| amplitude(flow, wave));
+    Some(amplitudes.fold(0.0, f64::max))
+}
+
 /// Decay of the shortest wave in a step up to which the solver takes viscosity explicitly.
 const EXPLICIT: f64 = 0.1;
 
 /// The Courant number up to which every wave decays, with `viscous = nu dt/h^2` explicit where it is small and by Crank-Nicolson else.
 fn limit(scheme: TimeScheme, viscous: f64) -> f64 {
-    let decays = |courant: f64| {
-        (1..=180).all(|k| {
-            let theta = PI * f64::from(k) / 180.0;
-            let kappa = 2.0 * (9.0 / 8.0 * (0.5 * theta).sin() - (1.5 * theta).sin() / 24.0);
-            let decay = viscous * kappa * kappa;
-            let [explicit, implicit] = if viscous * KAPPA2 > EXPLICIT {
-                [0.0, decay]
-            } else {
-                [decay, 0.0]
-            };
-            root(
-                scheme,
-                Complex::new(-explicit, courant * symbol(theta)),
-                implicit,
-            ) <= 1.0
-        })
-    };
-    let (mut low, mut high) = (0.0, 2.5);
+    let mut low = 0.0;
+    let mut high = 2.5;
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        if decays(middle) {
+        if (1..=180).all(|k| decays(scheme, viscous, middle, PI * f64::from(k) / 180.0)) {
             low = middle
         } else {
             high = middle
         }
     }
     low
+}
+
+/// Whether a wave that turns by `theta` from one cell to the next decays.
+fn decays(scheme: TimeScheme, viscous: f64, courant: f64, theta: f64) -> bool {
+    let kappa = 2.0 * (9.0 / 8.0 * (0.5 * theta).sin() - (1.5 * theta).sin() / 24.0);
+    let decay = viscous * kappa * kappa;
+    let [explicit, implicit] = if viscous * KAPPA2 > EXPLICIT {
+        [0.0, decay]
+    } else {
+        [decay, 0.0]
+    };
+    let rate = Complex::new(-explicit, courant * symbol(theta));
+    root(scheme, rate, implicit) <= 1.0
 }
 
 /// Shares of a step that Wray's stages give the present rate and the one before.
@@ -178,15 +182,18 @@ const STAGES: [(f64, f64); 3] = [
 fn root(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
     match scheme {
         TimeScheme::AdamsBashforth2 => {
-            let (a, z) = ((1.0 - 0.5 * d) / (1.0 + 0.5 * d), z / (1.0 + 0.5 * d));
+            let a = (1.0 - 0.5 * d) / (1.0 + 0.5 * d);
+            let z = z / (1.0 + 0.5 * d);
             let b = a + 1.5 * z;
             let root = (b * b - 2.0 * z).sqrt();
             (0.5 * (b + root)).norm().max((0.5 * (b - root)).norm())
         }
         TimeScheme::RungeKutta3 => {
-            let (mut u, mut before) = (Complex::new(1.0, 0.0), Complex::new(0.0, 0.0));
+            let mut u = Complex::new(1.0, 0.0);
+            let mut before = Complex::new(0.0, 0.0);
             for (now, last) in STAGES {
-                let (rate, half) = (z * u, 0.5 * d * (now + last));
+                let rate = z * u;
+                let half = 0.5 * d * (now + last);
                 u = (u * (1.0 - half) + now * rate + last * before) / (1.0 + half);
                 before = rate;
             }
@@ -198,52 +205,28 @@ fn root(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
 /// Square of kappa h of a wave of two cells.
 const KAPPA2: f64 = 49.0 / 9.0;
 
+/// The directions along which a case is stiff, or its cells are long.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Directions {
+    One,
+    Two,
+}
+
+/// Cells along a direction of the flows that are stiff.
+const STIFF_CELLS: usize = 16;
+
 /// What the first step leaves of the shortest wave, stiff along one direction or two, by Crank-Nicolson.
 pub(super) fn stiff() -> Result<Vec<Panel>, Failure> {
-    const N: usize = 16;
     let cases = [
-        ("Crank-Nicolson, one direction", false),
-        ("Crank-Nicolson, two directions", true),
+        ("Crank-Nicolson, one direction", Directions::One),
+        ("Crank-Nicolson, two directions", Directions::Two),
     ];
-    let curves = cases.map(|(name, both)| {
+    let curves = cases.map(|(name, directions)| {
         Curve::new(name, &[1e1, 1e2, 1e3, 1e4, 1e5, 1e6], |viscous| {
-            let periodic = || Direction::periodic(N, 0.0, 1.0);
-            let mesh = Mesh::new(
-                Direction::thin(1.0),
-                periodic(),
-                if both {
-                    periodic()
-                } else {
-                    Direction::thin(1.0)
-                },
-            )?;
-            let step_s = 1e-3;
-            let settings = FlowSettings::new(
-                viscous / (N * N) as f64 / step_s,
-                TimeStep::Fixed { step_s },
-            );
-            let short = |a: f64| {
-                if ((a * N as f64) as usize).is_multiple_of(2) {
-                    1.0
-                } else {
-                    -1.0
-                }
-            };
-            let mut flow = Flow::new(mesh, settings, |[_, y, z]| {
-                [short(y) * if both { short(z) } else { 1.0 }, 0.0, 0.0]
-            })?
-            .0;
+            let mut flow = stiff_flow(directions, viscous)?;
             flow.step()?;
-            let (d, directions) = (viscous * KAPPA2, if both { 2.0 } else { 1.0 });
-            // The first step of either scheme is one of Runge-Kutta.
-            let theory =
-                STAGES
-                    .iter()
-                    .map(|(now, last)| (now + last) * d)
-                    .fold(1.0, |left: f64, d| {
-                        left * (1.0 - directions * d / (1.0 + 0.5 * d).powf(directions)).abs()
-                    });
-            Ok([flow.face_velocity_m_s(0)[0].abs(), theory])
+            let left = flow.face_velocity_m_s(0)[0].abs();
+            Ok([left, left_by_theory(directions, viscous)])
         })
     });
     let axes = logs(["ν Δt/h²", "share of the wave"]);
@@ -254,100 +237,149 @@ pub(super) fn stiff() -> Result<Vec<Panel>, Failure> {
     }])
 }
 
+/// The shortest wave along y, or along y and z.
+fn stiff_flow(directions: Directions, viscous: f64) -> Result<Flow, Failure> {
+    let across = match directions {
+        Directions::One => Direction::thin(1.0),
+        Directions::Two => Direction::periodic(STIFF_CELLS, 0.0, 1.0),
+    };
+    let along = Direction::periodic(STIFF_CELLS, 0.0, 1.0);
+    let mesh = Mesh::new(Direction::thin(1.0), along, across)?;
+    let step_s = 1e-3;
+    let viscosity_m2_s = viscous / (STIFF_CELLS * STIFF_CELLS) as f64 / step_s;
+    let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
+    let (flow, _) = Flow::new(mesh, settings, |[_, y, z]| {
+        let wave_across = match directions {
+            Directions::One => 1.0,
+            Directions::Two => shortest_wave(z),
+        };
+        [shortest_wave(y) * wave_across, 0.0, 0.0]
+    })?;
+    Ok(flow)
+}
+
+/// A wave of two cells.
+fn shortest_wave(position: f64) -> f64 {
+    let cell = (position * STIFF_CELLS as f64) as usize;
+    if cell.is_multiple_of(2) { 1.0 } else { -1.0 }
+}
+
+/// What Crank and Nicolson's factors leave of it. The first step of either scheme is one of Runge-Kutta.
+fn left_by_theory(directions: Directions, viscous: f64) -> f64 {
+    let directions = match directions {
+        Directions::One => 1.0,
+        Directions::Two => 2.0,
+    };
+    let mut left = 1.0;
+    for (now, last) in STAGES {
+        let d = (now + last) * (viscous * KAPPA2);
+        left *= (1.0 - directions * d / (1.0 + 0.5 * d).powf(directions)).abs();
+    }
+    left
+}
+
 /// The residual that an iteration of multigrid leaves, and what the direct solver leaves, on cells longer along y, or along x and y.
 pub(super) fn pressure() -> Result<Vec<Panel>, Failure> {
+    let multigrid = PressureMethod::Multigrid;
+    let direct = PressureMethod::Direct;
     let cases = [
-        (
-            "multigrid, cells long along y",
-            PressureMethod::Multigrid,
-            false,
-        ),
+        ("multigrid, cells long along y", multigrid, Directions::One),
         (
             "multigrid, cells long along x and y",
-            PressureMethod::Multigrid,
-            true,
+            multigrid,
+            Directions::Two,
         ),
         (
             "direct, what it leaves, long along y",
-            PressureMethod::Direct,
-            false,
+            direct,
+            Directions::One,
         ),
         (
             "direct, what it leaves, long along x and y",
-            PressureMethod::Direct,
-            true,
+            direct,
+            Directions::Two,
         ),
     ];
-    let curves = cases.map(|(name, pressure, both)| {
+    let curves = cases.map(|(name, pressure, directions)| {
         Curve::new(name, &[1.0, 1e1, 1e2, 1e3, 1e4, 1e5], |aspect| {
-            let slip =
-                |cells, length_m| Direction::between(cells, 0.0, length_m, Wall::Slip, Wall::Slip);
-            let [length_m, width_m] = [if both { aspect } else { 1.0 }, aspect];
-            let mesh = Mesh::new(
-                Direction::periodic(8, 0.0, length_m / 6.0),
-                slip(48, width_m),
-                slip(48, 1.0),
-            )?;
-            let settings = FlowSettings {
-                pressure,
-                pressure_tolerance: 1e-10,
-                ..FlowSettings::new(
-                    1e-4,
-                    TimeStep::Courant {
-                        courant: 0.3,
-                        longest_s: 1e-3,
-                    },
-                )
-            };
-            let eddies = move |[x, y, z]: [f64; 3]| {
-                let (a, b, c) = (
-                    TAU * 6.0 * x / length_m,
-                    TAU * y / width_m + 0.3,
-                    TAU * z + 0.5,
-                );
-                [
-                    0.2 * a.cos() * b.sin(),
-                    b.cos() * c.sin() + 0.3 * (5.0 * b).cos() * c.cos(),
-                    b.sin() * c.cos() + 0.1 * a.sin(),
-                ]
-            };
-            let mut flow = Flow::new(mesh, settings, eddies)?.0;
-            let mut worst = f64::NAN;
-            for _ in 0..3 {
-                let report = flow.step()?;
-                let of = if pressure == PressureMethod::Direct {
-                    report.pressure_residual
-                } else {
-                    report.pressure_factor
-                };
-                worst = worst.max(of.unwrap_or(f64::NAN));
-            }
-            Ok([worst, NO_THEORY])
+            let residual = worst_residual(pressure, directions, aspect)?;
+            Ok([residual, NO_THEORY])
         })
     });
-    let panel = Panel::new(
-        "pressure solvers on flat cells",
-        logs(["aspect of the cells", "residual left"]),
-        curves,
-    )?;
+    let axes = logs(["aspect of the cells", "residual left"]);
+    let panel = Panel::new("pressure solvers on flat cells", axes, curves)?;
     Ok(vec![Panel {
-        limit: Some(("at most 0.10 an iteration", 0.1, true)),
+        limit: Some(Limit::Level("at most 0.10 an iteration", 0.1)),
         ..panel
     }])
+}
+
+/// The largest residual in three steps of eddies, of the direct solver; of multigrid the largest factor of an iteration.
+fn worst_residual(
+    pressure: PressureMethod,
+    directions: Directions,
+    aspect: f64,
+) -> Result<f64, Failure> {
+    let length_m = match directions {
+        Directions::One => 1.0,
+        Directions::Two => aspect,
+    };
+    let mesh = Mesh::new(
+        Direction::periodic(8, 0.0, length_m / 6.0),
+        Direction::between(48, 0.0, aspect, Wall::Slip, Wall::Slip),
+        Direction::between(48, 0.0, 1.0, Wall::Slip, Wall::Slip),
+    )?;
+    let time_step = TimeStep::Courant {
+        courant: 0.3,
+        longest_s: 1e-3,
+    };
+    let settings = FlowSettings {
+        pressure,
+        pressure_tolerance: 1e-10,
+        ..FlowSettings::new(1e-4, time_step)
+    };
+    let (mut flow, _) = Flow::new(mesh, settings, |position_m| {
+        eddies(position_m, length_m, aspect)
+    })?;
+    let mut worst = f64::NAN;
+    for _ in 0..3 {
+        let report = flow.step()?;
+        let residual = match pressure {
+            PressureMethod::Direct => report.pressure_residual,
+            _ => report.pressure_factor,
+        };
+        worst = worst.max(residual.unwrap_or(f64::NAN));
+    }
+    Ok(worst)
+}
+
+/// Eddies in a box of some length along x and width along y.
+fn eddies([x, y, z]: [f64; 3], length_m: f64, width_m: f64) -> [f64; 3] {
+    let a = TAU * 6.0 * x / length_m;
+    let b = TAU * y / width_m + 0.3;
+    let c = TAU * z + 0.5;
+    [
+        0.2 * a.cos() * b.sin(),
+        b.cos() * c.sin() + 0.3 * (5.0 * b).cos() * c.cos(),
+        b.sin() * c.cos() + 0.1 * a.sin(),
+    ]
 }
 
 /// Energy that a flow without viscosity gains or loses in half a second, against a cube through the shortest step.
 pub(super) fn drift() -> Result<Vec<Panel>, Failure> {
     const STEPS_S: [f64; 5] = [0.02, 0.01, 0.005, 0.0025, 0.00125];
     let curves = SCHEMES.map(|(name, scheme)| {
-        let found = STEPS_S.map(|step_s| (step_s, energy_drift(scheme, step_s).ok()));
-        let last = found[4].1.unwrap_or(f64::NAN);
-        let point = |(step_s, drift): (f64, Option<f64>)| {
-            Some([step_s, drift?, last * (step_s / STEPS_S[4]).powi(3)])
-        };
+        let found = STEPS_S.map(|step_s| energy_drift(scheme, step_s).ok());
+        let last = found[4].unwrap_or(f64::NAN);
+        let mut points = Vec::new();
+        for (step_s, drift) in STEPS_S.into_iter().zip(found) {
+            if let Some(drift) = drift {
+                points.push([step_s, drift, last * (step_s / STEPS_S[4]).powi(3)]);
+            }
+        }
         Ok(Curve {
             name: name.into(),
-            points: found.into_iter().filter_map(point).collect(),
+            points,
         })
     });
     Ok(vec![Panel::new(
@@ -363,56 +395,55 @@ pub(super) fn fed() -> Result<Vec<Panel>, Failure> {
         ("no model", SubgridModel::None),
         ("multiscale WALE", SubgridModel::MULTISCALE_WALE),
     ];
-    let curves = SCHEMES.into_iter().flat_map(|(scheme_name, scheme)| {
-        models.map(|(model_name, subgrid)| {
-            let courants = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0];
-            // Where steps are refused there is no point.
-            let point = |courant| {
-                Some([
-                    courant,
-                    fed_over_taken(scheme, subgrid, courant).ok()?,
-                    NO_THEORY,
-                ])
-            };
-            let points = courants.into_iter().filter_map(point).collect();
-            Ok(Curve {
+    let mut curves = Vec::new();
+    for (scheme_name, scheme) in SCHEMES {
+        for (model_name, subgrid) in models {
+            let mut points = Vec::new();
+            for courant in [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0] {
+                // Where steps are refused there is no point.
+                if let Ok(fed) = fed_over_taken(scheme, subgrid, courant) {
+                    points.push([courant, fed, NO_THEORY]);
+                }
+            }
+            curves.push(Ok(Curve {
                 name: format!("{scheme_name}, {model_name}"),
                 points,
-            })
-        })
-    });
+            }));
+        }
+    }
     let axes = ["Courant number", "fed over taken"].map(Axis::linear);
     let panel = Panel::new("energy that steps feed, over what is taken", axes, curves)?;
     Ok(vec![Panel {
-        limit: Some(("nothing fed", 0.0, true)),
+        limit: Some(Limit::Level("nothing fed", 0.0)),
         ..panel
     }])
 }
 
 fn fed_over_taken(scheme: TimeScheme, subgrid: SubgridModel, courant: f64) -> Result<f64, Failure> {
     let mut case = cases::taylor_green_3d(16, 1e4)?;
-    let time_step = TimeStep::Courant {
+    case.settings.scheme = scheme;
+    case.settings.subgrid = subgrid;
+    case.settings.time_step = TimeStep::Courant {
         courant,
         longest_s: 1.0,
     };
-    (
-        case.settings.scheme,
-        case.settings.subgrid,
-        case.settings.time_step,
-    ) = (scheme, subgrid, time_step);
     let (mut flow, start) = case.start()?;
     let mut steps = Vec::new();
     while flow.time_s() < 5.0 {
         steps.push(flow.step()?);
     }
     // Powers are those at the start of a step: at its end they are those of the next one.
-    let power = |step: &StepReport| step.viscous_power_m5_s3 + step.subgrid_power_m5_s3;
     let taken: f64 = steps
         .windows(2)
-        .map(|pair| -0.5 * pair[0].step_s * (power(&pair[0]) + power(&pair[1])))
+        .map(|pair| -0.5 * pair[0].step_s * (power_m5_s3(&pair[0]) + power_m5_s3(&pair[1])))
         .sum();
     let last = steps.len().saturating_sub(2);
     Ok((steps[last].kinetic_energy_m5_s2 - start.kinetic_energy_m5_s2 + taken) / taken)
+}
+
+/// Power of viscosity and of subgrid stress.
+fn power_m5_s3(step: &StepReport) -> f64 {
+    step.viscous_power_m5_s3 + step.subgrid_power_m5_s3
 }
 
 /// Energy of Taylor and Green's vortices on 16 cells a side after 150 steps, over that of the start.

@@ -26,12 +26,14 @@ impl Curve {
         places: &[f64],
         mut at: impl FnMut(f64) -> Result<[f64; 2], Failure>,
     ) -> Result<Self, Failure> {
-        let points = places
-            .iter()
-            .map(|&x| at(x).map(|[measured, theory]| [x, measured, theory]));
+        let mut points = Vec::new();
+        for &x in places {
+            let [measured, theory] = at(x)?;
+            points.push([x, measured, theory]);
+        }
         Ok(Self {
             name: name.into(),
-            points: points.collect::<Result<_, _>>()?,
+            points,
         })
     }
 }
@@ -39,12 +41,21 @@ impl Curve {
 /// What stands for a theory where there is none.
 const NO_THEORY: f64 = f64::NAN;
 
+/// A limit that the program keeps: its name, and where it is.
+#[derive(Clone, Copy)]
+enum Limit {
+    /// Of what is measured.
+    Level(&'static str, f64),
+    /// Of what it is measured against.
+    Abscissa(&'static str, f64),
+}
+
 /// Curves over one pair of axes.
 pub(crate) struct Panel {
     title: &'static str,
     axes: [Axis; 2],
-    /// The limit that the program keeps: its name, where it is, whether it is a level.
-    limit: Option<(&'static str, f64, bool)>,
+    /// The limit that the program keeps.
+    limit: Option<Limit>,
     /// Theory that says no more is round-off, and not drawn.
     least: f64,
     curves: Vec<Curve>,
@@ -75,6 +86,8 @@ fn logs(labels: [&str; 2]) -> [Axis; 2] {
 const EXACT: usize = 3;
 /// Of a wave of which a step leaves less the solver's round-off is left.
 const ROUND_OFF: f64 = 1e-9;
+/// Positive measurements below this are not drawn.
+const LEAST_DRAWN: f64 = 1e-17;
 
 type Measurement = fn() -> Result<Vec<Panel>, Failure>;
 
@@ -104,94 +117,102 @@ pub(crate) fn measure() -> Result<Vec<Panel>, Failure> {
 
 /// Largest distance of a point from the line of its theory, relative, where the theory is exact and above what round-off leaves.
 pub(crate) fn furthest(panels: &[Panel]) -> f64 {
-    let points = panels[..EXACT]
-        .iter()
-        .flat_map(|panel| &panel.curves)
-        .flat_map(|curve| &curve.points);
-    let exact = points.filter(|[.., theory]| *theory > ROUND_OFF);
-    exact
-        .map(|[_, measured, theory]| (measured / theory - 1.0).abs())
-        .fold(0.0, f64::max)
+    let mut furthest = 0.0_f64;
+    for curve in panels[..EXACT].iter().flat_map(|panel| &panel.curves) {
+        for [_, measured, theory] in &curve.points {
+            if *theory > ROUND_OFF {
+                furthest = furthest.max((measured / theory - 1.0).abs());
+            }
+        }
+    }
+    furthest
 }
 
 /// One row a point.
 pub(crate) fn table(panels: &[Panel]) -> Table {
-    let curves = panels
-        .iter()
-        .flat_map(|panel| panel.curves.iter().map(move |curve| (panel.title, curve)));
-    let rows: Vec<(&str, &str, [f64; 3])> = curves
-        .flat_map(|(title, curve)| {
-            curve
-                .points
-                .iter()
-                .map(move |p| (title, curve.name.as_str(), *p))
-        })
-        .collect();
-    let table = Table::new()
-        .text("panel", rows.iter().map(|r| r.0))
-        .text("curve", rows.iter().map(|r| r.1));
-    let numbers = ["x", "measured", "theory"].into_iter().enumerate();
-    numbers.fold(table, |table, (k, name)| {
-        table.float(name, rows.iter().map(|r| r.2[k]))
-    })
+    let mut titles = Vec::new();
+    let mut names = Vec::new();
+    let mut points = Vec::new();
+    for panel in panels {
+        for curve in &panel.curves {
+            for point in &curve.points {
+                titles.push(panel.title);
+                names.push(curve.name.as_str());
+                points.push(*point);
+            }
+        }
+    }
+    let mut table = Table::new().text("panel", titles).text("curve", names);
+    for (k, name) in ["x", "measured", "theory"].into_iter().enumerate() {
+        table = table.float(name, points.iter().map(|point| point[k]));
+    }
+    table
 }
 
 /// A panel each: points measured, lines of theory in the same colour, and the limits that the program keeps, dashed. Points without a theory are joined.
 pub(crate) fn picture(panels: &[Panel]) -> Figure {
-    let drawn = panels.iter().map(
-        |Panel {
-             title,
-             axes: [x, y],
-             limit,
-             least,
-             curves,
-         }| {
-            let mut plot = CurvePlot {
-                shape: 0.7,
-                ..CurvePlot::new(title, x.clone(), y.clone())
-            };
-            for (colour, Curve { name, points }) in curves
-                .iter()
-                .filter(|curve| !curve.points.is_empty())
-                .enumerate()
-            {
-                let theory = points.iter().map(|p| (p[0], p[2])).filter(|p| p.1 > *least);
-                let measured = points
-                    .iter()
-                    .map(|p| (p[0], p[1]))
-                    .filter(|p| p.1 <= 0.0 || p.1 > 1e-17);
-                let style = if points[0][2].is_nan() {
-                    Style::LineMarkers
-                } else {
-                    Style::Markers
-                };
-                plot = plot.with(Series::new(name, style, measured).in_colour(colour));
-                plot = plot.with(Series::new("", Style::Line, theory).in_colour(colour));
-            }
-            if let &Some((name, at, is_level)) = limit {
-                let [x, y] = [0, 1].map(|k| {
-                    let all = curves
-                        .iter()
-                        .flat_map(|curve| &curve.points)
-                        .map(|p| p[k])
-                        .filter(|v| v.is_finite());
-                    all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                        (low.min(value), high.max(value))
-                    })
-                });
-                let line = if is_level {
-                    [(x.0, at), (x.1, at)]
-                } else {
-                    [(at, y.0), (at, y.1)]
-                };
-                plot = plot.with(Series::new(name, Style::Dash, line).in_colour(6));
-            }
-            plot
-        },
-    );
     Figure {
         columns: 2,
         width: 1300.0,
-        ..Figure::stacked(drawn)
+        ..Figure::stacked(panels.iter().map(Panel::plot))
+    }
+}
+
+impl Panel {
+    fn plot(&self) -> CurvePlot {
+        let [x, y] = self.axes.clone();
+        let mut plot = CurvePlot {
+            shape: 0.7,
+            ..CurvePlot::new(self.title, x, y)
+        };
+        let curves = self.curves.iter().filter(|curve| !curve.points.is_empty());
+        for (colour, curve) in curves.enumerate() {
+            let mut theory = Vec::new();
+            let mut measured = Vec::new();
+            for [x, measurement, expected] in &curve.points {
+                if *expected > self.least {
+                    theory.push((*x, *expected));
+                }
+                if *measurement <= 0.0 || *measurement > LEAST_DRAWN {
+                    measured.push((*x, *measurement));
+                }
+            }
+            let style = if curve.points[0][2].is_nan() {
+                Style::LineMarkers
+            } else {
+                Style::Markers
+            };
+            plot = plot.with(Series::new(&curve.name, style, measured).in_colour(colour));
+            plot = plot.with(Series::new("", Style::Line, theory).in_colour(colour));
+        }
+        let Some(limit) = self.limit else {
+            return plot;
+        };
+        let (name, line) = match limit {
+            Limit::Level(name, level) => {
+                let (first, last) = self.extent(0);
+                (name, [(first, level), (last, level)])
+            }
+            Limit::Abscissa(name, x) => {
+                let (low, high) = self.extent(1);
+                (name, [(x, low), (x, high)])
+            }
+        };
+        plot.with(Series::new(name, Style::Dash, line).in_colour(6))
+    }
+
+    /// The least and the largest number of all points in a column: 0 where, 1 what was measured.
+    fn extent(&self, column: usize) -> (f64, f64) {
+        let mut low = f64::INFINITY;
+        let mut high = f64::NEG_INFINITY;
+        for curve in &self.curves {
+            for point in &curve.points {
+                if point[column].is_finite() {
+                    low = low.min(point[column]);
+                    high = high.max(point[column]);
+                }
+            }
+        }
+        (low, high)
     }
 }
