@@ -141,7 +141,7 @@ fn moments_outside_m_s(wind_m_s: f64) -> [f64; 3] {
         wind_m_s,
         ..PairCase::FIGURES
     };
-    let scene = PairScan::of(&case, NoiseModel::BandLimited, (200e-9, 0.0), 3, 1).unwrap();
+    let scene = PairScan::of(&case, NoiseModel::BandLimited, 200e-9, 0.0, 3, 1).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW).unwrap();
     let (sampling, kind) = (&scene.sampling, SignalKind::Real);
     let scan = scene

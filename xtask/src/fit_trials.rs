@@ -310,7 +310,8 @@ pub(crate) fn run(args: &FitTrialsArgs) -> Outcome {
     let pair = PairScan::of(
         &trials.case,
         NoiseModel::BandLimited,
-        (PULSE_S, args.snr_db),
+        PULSE_S,
+        args.snr_db,
         GATE_STEP,
         args.seed,
     )?;

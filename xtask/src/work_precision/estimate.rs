@@ -18,6 +18,8 @@ use wakescope_estimate::{
 };
 use wakescope_signal::NoiseModel;
 
+/// A method of which a larger fraction of the estimates is bad has no number.
+const MOST_BAD: f64 = 0.2;
 /// Windows of one estimate.
 pub(crate) const WINDOWS: usize = 20;
 
@@ -35,11 +37,8 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
         ("0 dB, band", NoiseModel::BandLimited, 0.0),
         ("20 dB, band", NoiseModel::BandLimited, 20.0),
     ];
-    let (cases, trials) = if quick {
-        (&cases[..1], 2000)
-    } else {
-        (&cases[..], 6000)
-    };
+    let cases = if quick { &cases[..1] } else { &cases[..] };
+    let trials = if quick { 2000 } else { 6000 };
     let mut rows = Vec::new();
     for &(case, noise, snr_db) in cases {
         rows.extend(Uniform::new(noise, snr_db, trials)?.rows(case, quick)?);
@@ -80,93 +79,76 @@ impl Uniform {
         statistic: &dyn Statistic<f64>,
         estimator: &dyn Estimator,
     ) -> Vec<(f64, bool)> {
-        let (mut scratch, mut one) = (Scratch::new(), vec![0.0; statistic.statistic_len()]);
+        let mut scratch = Scratch::new();
+        let mut one = vec![0.0; statistic.statistic_len()];
         let mut mean = vec![0.0; one.len()];
-        let error = |(velocity_m_s, windows): &(f64, Vec<Vec<f64>>)| {
+        let mut errors = Vec::with_capacity(self.trials.len());
+        for (velocity_m_s, windows) in &self.trials {
             mean.fill(0.0);
             for window in windows {
                 statistic.evaluate(window, &mut scratch, &mut one);
-                mean.iter_mut()
-                    .zip(&one)
-                    .for_each(|(sum, value)| *sum += value / WINDOWS as f64);
+                for (sum, value) in mean.iter_mut().zip(&one) {
+                    *sum += value / WINDOWS as f64;
+                }
             }
             let found = estimator.estimate(&mean, &mut scratch);
-            (found.velocity_m_s - velocity_m_s, found.is_good())
-        };
-        self.trials.iter().map(error).collect()
+            errors.push((found.velocity_m_s - velocity_m_s, found.is_good()));
+        }
+        errors
     }
 
     /// One setting: the time is that of one estimate from all its windows.
     fn row(
         &self,
-        of: [&str; 3],
+        names: [&str; 3],
         value: f64,
         statistic: &dyn Statistic<f64>,
         estimator: &dyn Estimator,
     ) -> Result<Row, Failure> {
         let (errors, cost) = fastest(|| Ok(self.errors(statistic, estimator)))?;
-        let errors: Vec<f64> = errors
-            .into_iter()
-            .map(|(error, good)| if good { error } else { f64::NAN })
-            .collect();
-        let found = good_and_bad(&errors, BAND_M_S);
-        let excess = if found.bad_fraction > 0.2 {
+        let mut errors_m_s = Vec::with_capacity(errors.len());
+        for (error_m_s, is_good) in errors {
+            errors_m_s.push(if is_good { error_m_s } else { f64::NAN });
+        }
+        let found = good_and_bad(&errors_m_s, BAND_M_S);
+        let excess = if found.bad_fraction > MOST_BAD {
             f64::NAN
         } else {
             found.std_good_m_s / self.bound_m_s - 1.0
         };
-        let (standard_error, cost) = (
-            found.std_good_error_m_s / self.bound_m_s,
-            cost.scaled(1.0 / self.trials.len() as f64),
-        );
-        Ok(Row::new(
-            of,
-            value,
-            Found {
-                error: excess,
-                standard_error,
-                cost,
-                set_up_s: 0.0,
-            },
-        ))
+        let found = Found {
+            error: excess,
+            standard_error: found.std_good_error_m_s / self.bound_m_s,
+            cost: cost.scaled(1.0 / self.trials.len() as f64),
+            set_up_s: 0.0,
+        };
+        Ok(Row::new(names, value, found))
     }
 
     fn rows(&self, case: &'static str, quick: bool) -> Result<Vec<Row>, Failure> {
         let all = Methods::all(&self.known)?;
-        let of = all.methods.iter().map(|method| {
+        let mut rows = Vec::new();
+        for method in &all.methods {
+            let names = [case, method.name, "none"];
             let statistic = all.statistics[method.statistic].as_ref();
-            self.row(
-                [case, method.name, "none"],
-                0.0,
-                statistic,
-                method.estimator.as_ref(),
-            )
-        });
-        let mut rows = of.collect::<Result<Vec<_>, _>>()?;
-        let (s, kind) = (sampling()?, SignalKind::Real);
+            rows.push(self.row(names, 0.0, statistic, method.estimator.as_ref())?);
+        }
+        let s = sampling()?;
+        let kind = SignalKind::Real;
+        let lags = unweighted_lags(WINDOW);
         let plain = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW)?;
         for padded in [64, 128, 256, 1024, 4096] {
-            let peak = SpectralPeak::new(
-                &s,
-                kind,
-                &unweighted_lags(WINDOW),
-                padded,
-                Refinement::Parabola,
-            )?;
-            rows.push(self.row(
-                [case, "PA by padding", "padded_samples"],
-                padded as f64,
-                &plain,
-                &peak,
-            )?);
+            let names = [case, "PA by padding", "padded_samples"];
+            let peak = SpectralPeak::new(&s, kind, &lags, padded, Refinement::Parabola)?;
+            rows.push(self.row(names, padded as f64, &plain, &peak)?);
         }
         if quick {
             return Ok(rows);
         }
         for order in [4, 8, 16, 32] {
-            let value = order as f64;
-            let ca = ModelPeak::new(&s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
-            rows.push(self.row([case, "CA by order", "order"], value, &plain, &ca)?);
+            let names = [case, "CA by order", "order"];
+            let peak = ModelPeak::new(&s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
+            rows.push(self.row(names, order as f64, &plain, &peak)?);
         }
         Ok(rows)
     }

@@ -9,30 +9,34 @@ use wakescope_sim::io::csv_input::TextTable;
 /// Rows of all tables of other programs, the times multiplied by what the kernel takes here over what it took there.
 pub(super) fn rows() -> Result<Vec<Row>, Failure> {
     let kernel_s = physics::kernel_s()?;
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(root().join("docs/peers"))? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|e| e == "csv") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
     let mut rows = Vec::new();
-    let mut files: Vec<_> =
-        std::fs::read_dir(root().join("docs/peers"))?.collect::<Result<_, _>>()?;
-    files.sort_by_key(std::fs::DirEntry::path);
-    for path in files
-        .iter()
-        .map(std::fs::DirEntry::path)
-        .filter(|path| path.extension().is_some_and(|e| e == "csv"))
-    {
-        let (table, name) = (TextTable::read(&path)?, path.display());
-        let there_s = table
-            .comment
-            .lines()
-            .find_map(|line| line.trim().strip_prefix("kernel_s = ")?.parse::<f64>().ok());
-        let there_s = there_s
-            .ok_or_else(|| Failure::new(format!("{name}: its head does not say kernel_s")))?;
+    for path in paths {
+        let name = path.display();
+        let table = TextTable::read(&path)?;
+        let there_s = kernel_of(&table)
+            .ok_or_else(|| Failure::new(format!("{name}: its head has no kernel_s")))?;
         for cells in &table.rows {
-            let row = row(cells, kernel_s / there_s);
-            rows.push(
-                row.ok_or_else(|| Failure::new(format!("{name}: not a row: {}", cells.join(","))))?,
-            );
+            let row = row(cells, kernel_s / there_s)
+                .ok_or_else(|| Failure::new(format!("{name}: not a row: {}", cells.join(","))))?;
+            rows.push(row);
         }
     }
     Ok(rows)
+}
+
+/// Run time of the kernel on the machine of a table \[s\].
+fn kernel_of(table: &TextTable) -> Option<f64> {
+    let mut lines = table.comment.lines();
+    let value = lines.find_map(|line| line.trim().strip_prefix("kernel_s = "))?;
+    value.parse().ok()
 }
 
 /// `panel,method,version,value,error,standard_error,cpu_s`.

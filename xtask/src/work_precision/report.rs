@@ -3,124 +3,166 @@
 use super::cases::{CASES, Guide, Panel};
 use super::{Row, TARGETS};
 use crate::cost::machine;
-use std::fmt::Write as _;
+use std::collections::BTreeSet;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Of more methods than these a panel shows the best settings.
 const MOST_METHODS: usize = 4;
 
-/// The panels of the cases that are drawn, the rows of each in the order of their times, and those that have no error, for the setting fails.
-fn panels(rows: &[Row]) -> impl Iterator<Item = (&'static Panel, Vec<&Row>, Vec<&Row>)> {
-    CASES.iter().filter_map(|case| {
-        let of_case = rows.iter().filter(|row| row.case == case.name);
-        let (failed, mut drawn): (Vec<&Row>, Vec<&Row>) =
-            of_case.partition(|row| row.found.error.is_nan());
-        drawn.retain(|row| row.found.error > 0.0 && row.found.cost.cpu_s > 0.0);
+/// A panel with the rows of its case.
+struct Drawn<'r> {
+    panel: &'static Panel,
+    /// In the order of their times.
+    rows: Vec<&'r Row>,
+    /// Rows without an error, since the setting fails.
+    failed: Vec<&'r Row>,
+}
+
+/// The panels of the cases that are drawn.
+fn panels(rows: &[Row]) -> Vec<Drawn<'_>> {
+    let mut panels = Vec::new();
+    for case in CASES.iter() {
+        let mut drawn = Vec::new();
+        let mut failed = Vec::new();
+        for row in rows.iter().filter(|row| row.case == case.name) {
+            if row.found.error.is_nan() {
+                failed.push(row);
+            } else if row.found.error > 0.0 && row.found.cost.cpu_s > 0.0 {
+                drawn.push(row);
+            }
+        }
         drawn.sort_by(|a, b| a.found.cost.cpu_s.total_cmp(&b.found.cost.cpu_s));
-        let panel = case.panel.as_ref().filter(|_| !drawn.is_empty())?;
-        Some((panel, drawn, failed))
-    })
+        if let Some(panel) = case.panel.as_ref().filter(|_| !drawn.is_empty()) {
+            panels.push(Drawn {
+                panel,
+                rows: drawn,
+                failed,
+            });
+        }
+    }
+    panels
 }
 
 /// The six panels: a curve for each method, one colour for each program.
 pub(crate) fn picture(rows: &[Row]) -> Figure {
-    let panels = panels(rows).map(|(panel, drawn, failed)| curves(panel, &drawn, &failed));
     Figure {
         columns: 2,
         width: 1300.0,
-        ..Figure::stacked(panels)
+        ..Figure::stacked(panels(rows).iter().map(Drawn::plot))
     }
 }
 
-fn curves(panel: &Panel, rows: &[&Row], failed: &[&Row]) -> CurvePlot {
-    let point = |row: &&Row| (row.found.cost.cpu_s, row.found.error);
-    let (x_range, y_range) = (
-        widened(&[rows, failed].concat(), |row| row.found.cost.cpu_s, 1.0),
-        widened(rows, |row| row.found.error, 2.0),
-    );
-    let x = Axis {
-        range: Some(x_range),
-        ..Axis::log("processor time, one thread [s]")
-    };
-    let y = Axis {
-        range: Some(y_range),
-        ..Axis::log("relative error")
-    };
-    let mut plot = CurvePlot {
-        shape: 0.78,
-        ..CurvePlot::new(&panel.title, x, y)
-    };
-    let mut own: Vec<&str> = rows
-        .iter()
-        .filter(|row| row.is_own())
-        .map(|row| row.method.as_str())
-        .collect();
-    own.sort_unstable();
-    own.dedup();
-    // Of many methods only the settings that no other beats are drawn.
-    let name = |row: &Row| match row.is_own() {
-        true if own.len() > MOST_METHODS => {
-            if row.is_on_front {
-                "wakescope, its best settings".into()
-            } else {
-                String::new()
+/// Time and error of a row.
+fn point(row: &Row) -> (f64, f64) {
+    (row.found.cost.cpu_s, row.found.error)
+}
+
+impl Drawn<'_> {
+    fn plot(&self) -> CurvePlot {
+        let all = [&self.rows[..], &self.failed].concat();
+        let times_s = widened(&all, |row| row.found.cost.cpu_s, 1.0);
+        let errors = widened(&self.rows, |row| row.found.error, 2.0);
+        let x = Axis {
+            range: Some(times_s),
+            ..Axis::log("processor time, one thread [s]")
+        };
+        let y = Axis {
+            range: Some(errors),
+            ..Axis::log("relative error")
+        };
+        let mut plot = CurvePlot {
+            shape: 0.78,
+            ..CurvePlot::new(&self.panel.title, x, y)
+        };
+        for (colour, method) in self.labels().iter().enumerate() {
+            for series in self.series(method) {
+                plot = plot.with(series.in_colour(colour));
             }
         }
-        true => format!("wakescope, {}", row.method),
-        false => row.method.clone(),
-    };
-    let mut methods: Vec<(bool, String)> =
-        rows.iter().map(|row| (!row.is_own(), name(row))).collect();
-    methods.sort_unstable();
-    methods.dedup();
-    methods.retain(|(_, name)| !name.is_empty());
-    for (colour, (_, method)) in methods.iter().enumerate() {
-        let of: Vec<&&Row> = rows.iter().filter(|row| name(row) == *method).collect();
-        let points: Vec<(f64, f64)> = of.iter().map(|row| point(row)).collect();
+        if let Some(guide) = self.guide() {
+            plot = plot.with(guide.in_colour(6));
+        }
+        if self.failed.is_empty() {
+            return plot;
+        }
+        let edge = errors.1 * (errors.0 / errors.1).powf(0.03);
+        let points = self.failed.iter().map(|row| (row.found.cost.cpu_s, edge));
+        let failed = Series::new("fails (at the upper edge)", Style::Markers, points);
+        plot.with(failed.in_colour(5))
+    }
+
+    /// Whether this program has so many methods that only the settings that no other beats are drawn.
+    fn has_many_methods(&self) -> bool {
+        let own = self.rows.iter().filter(|row| row.is_own());
+        let methods: BTreeSet<&str> = own.map(|row| row.method.as_str()).collect();
+        methods.len() > MOST_METHODS
+    }
+
+    /// The label of the curve of a row; none if it is not drawn.
+    fn label(&self, row: &Row) -> Option<String> {
+        if !row.is_own() {
+            return Some(row.method.clone());
+        }
+        if !self.has_many_methods() {
+            return Some(format!("wakescope, {}", row.method));
+        }
+        row.is_on_front
+            .then(|| "wakescope, its best settings".into())
+    }
+
+    /// The labels of all curves, those of this program first.
+    fn labels(&self) -> Vec<String> {
+        let mut labels = BTreeSet::new();
+        for row in &self.rows {
+            if let Some(label) = self.label(row) {
+                labels.insert((!row.is_own(), label));
+            }
+        }
+        labels.into_iter().map(|(_, label)| label).collect()
+    }
+
+    /// The curve of a label, and its errors if there are any.
+    fn series(&self, label: &str) -> Vec<Series> {
+        let mut points = Vec::new();
+        let mut errors = Vec::new();
+        for row in &self.rows {
+            if self.label(row).as_deref() == Some(label) {
+                points.push(point(row));
+                errors.push(row.found.standard_error.min(0.9 * row.found.error));
+            }
+        }
         let style = if points.len() > 1 {
             Style::LineMarkers
         } else {
             Style::Markers
         };
-        let errors: Vec<f64> = of
-            .iter()
-            .map(|row| row.found.standard_error.min(0.9 * row.found.error))
-            .collect();
-        plot = plot.with(Series::new(method, style, points.clone()).in_colour(colour));
+        let mut series = vec![Series::new(label, style, points.clone())];
         if errors.iter().any(|error| *error > 0.0) {
-            plot = plot.with(
-                Series::new("", Style::Markers, points)
-                    .with_band(&errors)
-                    .in_colour(colour),
-            );
+            series.push(Series::new("", Style::Markers, points).with_band(&errors));
         }
+        series
     }
-    if let (Some(Guide { label, power }), Some(first)) =
-        (&panel.guide, rows.iter().find(|row| row.is_own()))
-    {
-        let (start_s, error) = point(first);
-        let last_s = rows
-            .iter()
-            .filter(|row| row.is_own())
-            .map(|row| row.found.cost.cpu_s)
-            .fold(start_s, f64::max);
+
+    /// The slope through the first point of this program.
+    fn guide(&self) -> Option<Series> {
+        let Guide { label, power } = self.panel.guide.as_ref()?;
+        let mut own = self.rows.iter().filter(|row| row.is_own());
+        let (start_s, error) = point(own.next()?);
+        let last_s = own.map(|row| row.found.cost.cpu_s).fold(start_s, f64::max);
         let line = [start_s, last_s].map(|t| (t, 0.7 * error * (t / start_s).powf(*power)));
-        plot = plot.with(Series::new(label, Style::Dash, line).in_colour(6));
+        Some(Series::new(label, Style::Dash, line))
     }
-    if failed.is_empty() {
-        return plot;
-    }
-    let edge = y_range.1 * (y_range.0 / y_range.1).powf(0.03);
-    let points = failed.iter().map(|row| (row.found.cost.cpu_s, edge));
-    plot.with(Series::new("fails (at the upper edge)", Style::Markers, points).in_colour(5))
 }
 
 /// A logarithmic range with an eighth to spare at both ends, of so many decades at least.
 fn widened(rows: &[&Row], value: fn(&Row) -> f64, decades: f64) -> (f64, f64) {
-    let logarithms = rows.iter().map(|row| value(row).log10());
-    let (low, high) = logarithms.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-        (l.min(v), h.max(v))
-    });
+    let mut low = f64::INFINITY;
+    let mut high = f64::NEG_INFINITY;
+    for row in rows {
+        let logarithm = value(row).log10();
+        low = low.min(logarithm);
+        high = high.max(logarithm);
+    }
     let spare = (0.12 * (high - low))
         .max(0.5 * (decades - (high - low)))
         .max(0.1);
@@ -130,58 +172,76 @@ fn widened(rows: &[&Row], value: fn(&Row) -> f64, decades: f64) -> (f64, f64) {
 /// Under each panel: what is compared, what this program costs, what others cost at their errors.
 pub(crate) fn text(rows: &[Row]) -> String {
     let mut out = format!("Measured on {}.\n\n", machine());
-    for (panel, drawn, failed) in panels(rows) {
-        let (own, others): (Vec<&Row>, Vec<&Row>) = drawn.into_iter().partition(|row| row.is_own());
-        let _ = writeln!(out, "**{}.** {}\n", panel.title, panel.compared);
-        let costs = TARGETS.iter().enumerate().map(|(place, (_, target))| {
-            let best = own.iter().find(|row| row.is_cheapest[place]);
-            let cost = best.map_or("by no setting".into(), |row| {
-                format!("{} ({})", seconds(row.found.cost.cpu_s), setting(row))
-            });
-            format!("{} % {cost}", 100.0 * target)
-        });
-        let _ = writeln!(
-            out,
-            "This program reaches {}.\n",
-            costs.collect::<Vec<_>>().join(", ")
-        );
-        let fails: Vec<String> = failed.into_iter().map(setting).collect();
-        if !fails.is_empty() {
-            let _ = writeln!(
-                out,
-                "No error, for the setting fails: {}.\n",
-                fails.join("; ")
-            );
-        }
-        if others.is_empty() {
-            continue;
-        }
-        out.push_str("| other program | error | its time over this program's at that error |\n|---|---|---|\n");
-        for row in &others {
-            let ratio = ratio(&own, row)
-                .map_or("this program has no setting so near".into(), |ratio| {
-                    format!("{ratio:.2}")
-                });
-            let _ = writeln!(
-                out,
-                "| {} {} | {:.2e} | {ratio} |",
-                row.method, row.version, row.found.error
-            );
-        }
-        let better = others
-            .iter()
-            .filter(|row| ratio(&own, row).is_none_or(|ratio| ratio < 1.0));
-        let better: Vec<String> = better
-            .map(|row| format!("{} at {:.1e}", row.method, row.found.error))
-            .collect();
-        let better = if better.is_empty() {
-            "none of them".into()
-        } else {
-            better.join(", ")
-        };
-        let _ = writeln!(out, "\nThe better buy: {better}.\n");
+    for drawn in panels(rows) {
+        out += &drawn.text();
     }
     out
+}
+
+impl Drawn<'_> {
+    fn text(&self) -> String {
+        let mut own = Vec::new();
+        let mut others = Vec::new();
+        for &row in &self.rows {
+            if row.is_own() {
+                own.push(row);
+            } else {
+                others.push(row);
+            }
+        }
+        let mut out = format!("**{}.** {}\n\n", self.panel.title, self.panel.compared);
+        let costs = costs(&own);
+        out += &format!("This program reaches {}.\n\n", costs.join(", "));
+        let failed: Vec<String> = self.failed.iter().map(|row| setting(row)).collect();
+        if !failed.is_empty() {
+            out += &format!(
+                "No error, for the setting fails: {}.\n\n",
+                failed.join("; ")
+            );
+        }
+        if !others.is_empty() {
+            out += &comparison(&own, &others);
+        }
+        out
+    }
+}
+
+/// The cheapest setting for each target.
+fn costs(own: &[&Row]) -> Vec<String> {
+    let mut costs = Vec::new();
+    for (index, (_, target)) in TARGETS.iter().enumerate() {
+        let best = own.iter().find(|row| row.is_cheapest[index]);
+        let cost = best.map_or("by no setting".into(), |row| {
+            format!("{} ({})", seconds(row.found.cost.cpu_s), setting(row))
+        });
+        costs.push(format!("{} % {cost}", 100.0 * target));
+    }
+    costs
+}
+
+/// The table of other programs, and which of them cost less at their errors.
+fn comparison(own: &[&Row], others: &[&Row]) -> String {
+    let mut out = String::from(
+        "| other program | error | its time over this program's at that error |\n|---|---|---|\n",
+    );
+    let mut better = Vec::new();
+    for row in others {
+        let ratio = ratio(own, row);
+        let words = ratio.map_or("this program has no setting so near".into(), |ratio| {
+            format!("{ratio:.2}")
+        });
+        out += &format!(
+            "| {} {} | {:.2e} | {words} |\n",
+            row.method, row.version, row.found.error
+        );
+        if ratio.is_none_or(|ratio| ratio < 1.0) {
+            better.push(format!("{} at {:.1e}", row.method, row.found.error));
+        }
+    }
+    if better.is_empty() {
+        better.push("none of them".into());
+    }
+    out + &format!("\nThe better buy: {}.\n\n", better.join(", "))
 }
 
 fn setting(row: &Row) -> String {
