@@ -24,4 +24,4 @@ pub use peak::SpectralPeak;
 pub use periodogram::{PeriodogramOptions, PeriodogramPlan};
 pub use pulse_pair::PulsePair;
 pub use statistic::{Estimator, Statistic, estimate_window};
-pub use velocity::{GateVelocity, Quality, Refinement, RunnerUp};
+pub use velocity::{GateVelocity, Quality, Refinement};

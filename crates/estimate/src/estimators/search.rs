@@ -1,4 +1,4 @@
-//! Search of a density for its peak inside the detector band, and what the peak tells: width, SNR, runner-up, flag.
+//! Search of a density for its peak inside the detector band, and what the peak tells: width, SNR, flag.
 //!
 //! Works on the densities of the band alone, whatever made them. Check: a tone returns its velocity; zero, constant and
 //! out-of-band signals are flagged; width and SNR of simulated wind (in the tests of the estimators).
@@ -7,7 +7,7 @@ use num_complex::Complex;
 use std::cell::LazyCell;
 
 use crate::error::Error;
-use crate::estimators::{GateVelocity, Quality, Refinement, RunnerUp};
+use crate::estimators::{GateVelocity, Quality, Refinement};
 use crate::spectrum::lag_spectrum::Band;
 use crate::spectrum::{LagSpectrum, ZoomSpectrum};
 use crate::window::{Sampling, Scratch, SignalKind};
@@ -75,18 +75,11 @@ pub(crate) struct Located {
     pub(crate) bin: f64,
     pub(crate) peak: f64,
     pub(crate) sum: f64,
-    lobe: Lobe,
-    pub(crate) flag: Quality,
-}
-
-/// Main peak and what lies beside it.
-struct Lobe {
     /// Mean density beside the main peak.
     floor: f64,
     /// Standard deviation of the main peak \[bins\]; NaN where it fills the band with noise beneath, which then is not known.
     width: f64,
-    /// Bin and density of the second peak.
-    second: Option<(usize, f64)>,
+    pub(crate) flag: Quality,
 }
 
 impl PeakSearch {
@@ -167,22 +160,23 @@ impl PeakSearch {
             Refinement::None => top as f64,
             _ => parabola(density, top),
         };
-        let lobe = Lobe::new(inside, top, peak);
+        let (floor, width) = floor_and_width(inside, top, peak);
         // What holds half of the power is no sidelobe, and a line outside is at least as far away as the edge of the band.
         let to_edge = top.min(self.band.bins - 1 - top) as f64 / self.padded as f64;
         let is_doubtful = self.power(sum) < 0.5 * lags.first().copied().unwrap_or(0.0)
-            && peak - lobe.floor < self.leaked(to_edge, density_limit(lags));
+            && peak - floor < self.leaked(to_edge, density_limit(lags));
         let flag = self.flag(
-            peak - lobe.floor,
+            peak - floor,
             top,
-            lobe.floor,
+            floor,
             if is_doubtful { anywhere() } else { None },
         );
         Located {
             bin,
             peak,
             sum,
-            lobe,
+            floor,
+            width,
             flag,
         }
     }
@@ -197,7 +191,6 @@ impl PeakSearch {
             };
         }
         let bins = self.band.bins as f64;
-        let lobe = &found.lobe;
         let bin_m_s =
             0.5 * self.sampling.wavelength_m * self.sampling.sample_rate_hz / self.padded as f64;
         let square_m2_s2 = bin_m_s * bin_m_s;
@@ -208,18 +201,12 @@ impl PeakSearch {
             power,
             quality: found.peak * bins / found.sum,
             detection: found.peak,
-            spread_m2_s2: self.spread(lobe.width * lobe.width) * square_m2_s2,
+            spread_m2_s2: self.spread(found.width * found.width) * square_m2_s2,
             resolution_m2_s2: self
                 .widths
                 .first()
                 .map_or(f64::NAN, |line| line.0 * square_m2_s2),
-            snr: (found.sum / (bins * lobe.floor.max(0.0)) - 1.0).max(0.0),
-            runner_up: lobe.second.map(|(bin, density)| RunnerUp {
-                velocity_m_s: self
-                    .sampling
-                    .velocity_m_s(self.band.frequency_hz(bin as f64)),
-                relative_density: density / found.peak,
-            }),
+            snr: (found.sum / (bins * found.floor.max(0.0)) - 1.0).max(0.0),
             flag: found.flag,
         }
     }
@@ -309,7 +296,7 @@ fn widths(lag_weights: &[f64], padded: usize, bins: usize) -> Result<Vec<(f64, f
         let density: Vec<f64> = (0..bins)
             .map(|bin| line[(bin + padded - bins / 2) % padded])
             .collect();
-        Ok::<_, Error>(Lobe::new(&density, bins / 2, line[0]).width.powi(2))
+        Ok::<_, Error>(floor_and_width(&density, bins / 2, line[0]).1.powi(2))
     };
     let own = seen(0.0, 0.0)?.sqrt();
     let mut pairs = Vec::<(f64, f64)>::new();
@@ -333,34 +320,28 @@ fn widths(lag_weights: &[f64], padded: usize, bins: usize) -> Result<Vec<(f64, f
     Ok(pairs)
 }
 
-impl Lobe {
-    fn new(density: &[f64], top: usize, peak: f64) -> Self {
-        let lowest = LazyCell::new(|| {
-            lanes(density, f64::INFINITY, |low, value| {
-                if value < low { value } else { low }
-            })
-        });
-        let (mut floor, mut beside) = (0.0, None);
-        let mut reach = [0.0; 2];
-        // the half height needs the floor and the floor the half height: one repetition settles it
-        for _ in 0..2 {
-            reach = half_widths(density, top, floor + 0.5 * (peak - floor));
-            beside = mean_beside(density, top, reach);
-            floor = beside.unwrap_or_else(|| *lowest);
-        }
-        let second = second_peak(density, top, reach);
-        let is_bare = beside.is_some() || *lowest < BARE * peak;
-        let width = if is_bare {
-            (reach[0] + reach[1]) / FULL_WIDTH
-        } else {
-            f64::NAN
-        };
-        Self {
-            floor,
-            width,
-            second,
-        }
+/// Mean density beside the main peak, and standard deviation of that \[bins\].
+fn floor_and_width(density: &[f64], top: usize, peak: f64) -> (f64, f64) {
+    let lowest = LazyCell::new(|| {
+        lanes(density, f64::INFINITY, |low, value| {
+            if value < low { value } else { low }
+        })
+    });
+    let (mut floor, mut beside) = (0.0, None);
+    let mut reach = [0.0; 2];
+    // the half height needs the floor and the floor the half height: one repetition settles it
+    for _ in 0..2 {
+        reach = half_widths(density, top, floor + 0.5 * (peak - floor));
+        beside = mean_beside(density, top, reach);
+        floor = beside.unwrap_or_else(|| *lowest);
     }
+    let is_bare = beside.is_some() || *lowest < BARE * peak;
+    let width = if is_bare {
+        (reach[0] + reach[1]) / FULL_WIDTH
+    } else {
+        f64::NAN
+    };
+    (floor, width)
 }
 
 /// Distances \[bins\] from `top` to where the density falls to `level` on either side; to the end of the band if it does not.
@@ -388,23 +369,6 @@ fn mean_beside(density: &[f64], top: usize, reach: [f64; 2]) -> Option<f64> {
     let count = low - first + last - high;
     (count > 0)
         .then(|| (lanes_sum(&density[first..low]) + lanes_sum(&density[high..last])) / count as f64)
-}
-
-/// Highest density beyond the first valley on each side of the peak.
-fn second_peak(density: &[f64], top: usize, reach: [f64; 2]) -> Option<(usize, f64)> {
-    let (left, right) = (top - reach[0] as usize, top + reach[1] as usize);
-    // from the half height on, to the first place where the density rises again
-    let low = (1..=left).rev().find(|&k| density[k - 1] > density[k]);
-    let high = (right..density.len() - 1).find(|&k| density[k + 1] > density[k]);
-    let below = low.map(|k| highest(&density[..k]));
-    let above = high.map(|k| {
-        let (place, value) = highest(&density[k + 1..]);
-        (k + 1 + place, value)
-    });
-    below
-        .into_iter()
-        .chain(above)
-        .reduce(|a, b| if b.1 > a.1 { b } else { a })
 }
 
 /// Fractional bin of the peak next to bin `top`, by parabola; `density` begins one bin early.
@@ -472,32 +436,26 @@ mod tests {
     }
 
     #[test]
-    fn lobe_of_two_gaussians_on_a_floor() {
+    fn floor_and_width_are_those_of_a_gaussian_beside_another_one() {
         let gaussian =
             |k: f64, centre: f64, width: f64| (-0.5 * ((k - centre) / width).powi(2)).exp();
         let density: Vec<f64> = (0..200)
             .map(f64::from)
             .map(|k| 0.1 + gaussian(k, 60.3, 6.0) + 0.5 * gaussian(k, 120.0, 4.0))
             .collect();
-        let lobe = Lobe::new(&density, 60, density[60]);
-        assert!((lobe.width - 6.0).abs() < 0.3, "{}", lobe.width);
-        assert_eq!(lobe.second.unwrap().0, 120);
+        let (_, width) = floor_and_width(&density, 60, density[60]);
+        assert!((width - 6.0).abs() < 0.3, "{width}");
         let alone: Vec<f64> = (0..200)
             .map(f64::from)
             .map(|k| 0.1 + gaussian(k, 60.3, 6.0))
             .collect();
-        let lobe = Lobe::new(&alone, 60, alone[60]);
+        let (floor, width) = floor_and_width(&alone, 60, alone[60]);
         assert!(
-            (lobe.floor - 0.1).abs() < 1e-3 && (lobe.width - 6.0).abs() < 0.05,
-            "{} {}",
-            lobe.floor,
-            lobe.width
+            (floor - 0.1).abs() < 1e-3 && (width - 6.0).abs() < 0.05,
+            "{floor} {width}"
         );
-        assert!(lobe.second.is_none());
         // a flat band: everything is the main peak, and nothing is above the floor
-        let flat = Lobe::new(&[1.0; 50], 0, 1.0);
-        assert!(flat.floor == 1.0 && flat.second.is_none());
-        let single = Lobe::new(&[1.0], 0, 1.0);
-        assert!(single.second.is_none());
+        assert_eq!(floor_and_width(&[1.0; 50], 0, 1.0).0, 1.0);
+        assert_eq!(floor_and_width(&[1.0], 0, 1.0).0, 1.0);
     }
 }

@@ -6,7 +6,8 @@
 
 use crate::error::{Error, length};
 use crate::estimators::{GateVelocity, Quality};
-use crate::window::{MissingSamples, Sample, Scratch};
+use crate::window::missing::Rule;
+use crate::window::{Sample, Scratch};
 
 /// Numbers drawn from one window, to be averaged over windows: I_k of Table 3.
 pub trait Statistic<S: Sample>: Sync {
@@ -69,8 +70,8 @@ impl Estimator for Box<dyn Estimator> {
     }
 }
 
-/// Velocity of a single window, without accumulation; [`Quality::Invalid`] if it holds a missing sample
-/// ([`MissingSamples::default`]).
+/// Velocity of a single window, without accumulation; [`Quality::Invalid`] if it holds a missing sample,
+/// as [`Scan::new`](crate::Scan::new) has it.
 ///
 /// # Errors
 /// [`Error::Length`] if the window has the wrong length or statistic and estimator do not match.
@@ -86,8 +87,7 @@ pub fn estimate_window<S: Sample>(
         estimator.statistic_len(),
         statistic.statistic_len(),
     )?;
-    let missing = MissingSamples::default();
-    let rule = missing.rule(window.iter().copied());
+    let rule = Rule::of(window.iter().copied());
     if !window.iter().all(|sample| rule.is_measured(*sample)) {
         return Ok(GateVelocity::none(Quality::Invalid));
     }

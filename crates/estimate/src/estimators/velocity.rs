@@ -23,18 +23,6 @@ pub enum Quality {
     Empty,
 }
 
-/// The second peak of a spectrum.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RunnerUp {
-    /// Radial velocity of the highest density beyond the valleys on both sides of the main peak \[m/s\].
-    pub velocity_m_s: f64,
-    /// Its density over that of the main peak, at most 1.
-    ///
-    /// An unweighted window alone has sidelobes of 0.047; two targets of like strength come near 1, and so does noise
-    /// without a signal.
-    pub relative_density: f64,
-}
-
 /// Velocity estimate of one gate or map point.
 ///
 /// Estimators of one's own fill in what they know and take the rest from [`GateVelocity::none`]:
@@ -70,8 +58,6 @@ pub struct GateVelocity {
     /// read too much: believe it where the peak stands out of noise, or take `power`. The sidelobes of an unweighted
     /// window count as noise, so that above 5 dB it reads too low; a Gaussian weighting is good to 20 dB.
     pub snr: f64,
-    /// The second peak, if there is one.
-    pub runner_up: Option<RunnerUp>,
     /// What the estimate is worth.
     pub flag: Quality,
 }
@@ -88,7 +74,6 @@ impl GateVelocity {
             spread_m2_s2: f64::NAN,
             resolution_m2_s2: f64::NAN,
             snr: f64::NAN,
-            runner_up: None,
             flag,
         }
     }

@@ -16,7 +16,8 @@ use crate::estimators::{Estimator, GateVelocity, Quality, Statistic};
 use crate::map::region::effective;
 use crate::map::{Chord, PolarPoint, ScanGeometry, WindowCorrelation};
 use crate::parallel::map_indexed;
-use crate::window::{Gates, MissingSamples, Sample, Sampling, Scratch};
+use crate::window::missing::Rule;
+use crate::window::{Gates, Sample, Sampling, Scratch};
 
 mod streamed;
 
@@ -88,7 +89,8 @@ impl Scan {
     /// Statistics of all windows of `records` \[ray, sample\]; ray i has elevation `elevation_rad[i]` \[rad\].
     ///
     /// Several pulses along one line of sight are rays of equal elevation. Windows with a missing sample are left out:
-    /// one that is not finite, a fill value, or one that dwarfs all others ([`MissingSamples::default`]).
+    /// one that is not finite, a fill value ([`FILL_VALUES`](crate::window::FILL_VALUES)), or one that dwarfs all others
+    /// ([`SampleSizes::outsized`](crate::window::SampleSizes::outsized)).
     ///
     /// # Errors
     /// [`Error::Length`] if lengths do not match; as [`ScanGeometry::new`].
@@ -99,32 +101,10 @@ impl Scan {
         elevation_rad: &[f64],
         records: ArrayView2<'_, S>,
     ) -> Result<Self, Error> {
-        Self::without_missing(
-            statistic,
-            sampling,
-            gates,
-            elevation_rad,
-            records,
-            &MissingSamples::default(),
-        )
-    }
-
-    /// The same with a rule of one's own for missing samples.
-    ///
-    /// # Errors
-    /// As [`Scan::new`].
-    pub fn without_missing<S: Sample>(
-        statistic: &(impl Statistic<S> + ?Sized),
-        sampling: &Sampling,
-        gates: &Gates,
-        elevation_rad: &[f64],
-        records: ArrayView2<'_, S>,
-        missing: &MissingSamples,
-    ) -> Result<Self, Error> {
         let (rays, samples) = records.dim();
         length("elevation_rad", rays, elevation_rad.len())?;
         let geometry = ScanGeometry::new(sampling, gates, elevation_rad, samples)?;
-        let rule = missing.rule(records.iter().copied());
+        let rule = Rule::of(records.iter().copied());
         let mut sums = ScanSums::new(statistic, gates, geometry, samples)?.with_rule(rule);
         sums.add(0, records)?;
         Ok(sums.finish())

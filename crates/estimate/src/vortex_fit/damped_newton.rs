@@ -185,19 +185,12 @@ const TURNED: f64 = 0.3;
 /// Most halvings of a step.
 const HALVINGS: i32 = 6;
 
-/// Shortens the steps of a fit to what is not smooth, as where peaks jump: each time they turn round, so that their ends are averaged
-/// (Kesten 1958). What only corrects a step that went too far is none of those.
-#[derive(Debug, Default)]
-pub(crate) struct Averaging {
-    turns: u32,
-}
-
-impl Averaging {
-    /// The part of a step that is gone, from its product with the step before and that of the latter with itself.
-    pub(crate) fn part(&mut self, with_last: f64, of_last: f64) -> f64 {
-        self.turns += u32::from(-with_last > TURNED * of_last);
-        f64::from(1 + self.turns).recip()
-    }
+/// The part of a step of a fit to what is not smooth, as where peaks jump, from its product with the step before and that of the latter with
+/// itself: `turns` counts how often steps turned round, so that their ends are averaged (Kesten 1958). What only corrects a step that
+/// went too far is none of those.
+pub(crate) fn averaged(turns: &mut u32, with_last: f64, of_last: f64) -> f64 {
+    *turns += u32::from(-with_last > TURNED * of_last);
+    f64::from(1 + *turns).recip()
 }
 
 /// The first end that there is of a part of a step, its half, its quarter and so on.
@@ -273,7 +266,7 @@ mod tests {
 
     #[test]
     fn steps_are_shortened_where_they_turn_round_and_halved_to_where_there_is_an_end() {
-        let mut averaging = Averaging::default();
+        let mut turns = 0;
         let products = [
             (0.0, 0.0),
             (2.0, 4.0),
@@ -282,7 +275,7 @@ mod tests {
             (1.0, 4.0),
             (-4.0, 4.0),
         ];
-        let parts = products.map(|(with_last, of_last)| averaging.part(with_last, of_last));
+        let parts = products.map(|(with_last, of_last)| averaged(&mut turns, with_last, of_last));
         assert_eq!(parts, [1.0, 1.0, 1.0, 0.5, 0.5, 1.0 / 3.0]);
         assert_eq!(halved(0.8, |part| (part < 0.3).then_some(part)), Some(0.2));
         assert_eq!(halved(1.0, |part| (part < 0.01).then_some(part)), None);

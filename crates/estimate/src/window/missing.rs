@@ -10,57 +10,9 @@ use crate::window::{Gates, Sample};
 /// 2^20 in amplitude are 120 dB in power: more than lies between the noise of a detector and a hard target.
 const GAP: usize = 20;
 
-/// What counts as a missing sample.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MissingSamples {
-    /// Values that stand for a sample that was not taken; one part of a complex sample is enough.
-    pub fill: Vec<f64>,
-    /// Whether samples count as missing that are more than 2^20 times larger than the next smaller ones, where they are
-    /// less than half of all that are not 0.
-    ///
-    /// A single 1e308 or an unknown fill value would otherwise outweigh all windows of its region.
-    pub outsized: bool,
-}
-
-impl Default for MissingSamples {
-    /// The fill values -9999 and that of NetCDF, 9.97e36, and outsized samples.
-    ///
-    /// Raw counts of a converter may well be -9999: they need [`MissingSamples::not_finite`].
-    fn default() -> Self {
-        // the default fill of NetCDF's floats and doubles is 15 x 2^119
-        Self {
-            fill: vec![-9999.0, 15.0 * 119f64.exp2()],
-            outsized: true,
-        }
-    }
-}
-
-impl MissingSamples {
-    /// Only samples that are not finite are missing.
-    #[must_use]
-    pub fn not_finite() -> Self {
-        Self {
-            fill: Vec::new(),
-            outsized: false,
-        }
-    }
-
-    /// The rule for a set of samples.
-    pub(crate) fn rule<S: Sample>(&self, samples: impl Iterator<Item = S>) -> Rule<'_> {
-        let mut rule = Rule {
-            fill: &self.fill,
-            limit: f64::INFINITY,
-        };
-        if self.outsized {
-            let mut sizes = SampleSizes::default();
-            samples
-                .filter(|sample| rule.is_measured(*sample))
-                .for_each(|sample| sizes.add(sample.largest_part()));
-            rule.limit = sizes.outsized();
-        }
-        rule
-    }
-}
+/// Values that stand for a sample that was not taken: -9999, and the fill value of NetCDF's floats and doubles. One part of a complex
+/// sample is enough.
+pub const FILL_VALUES: [f64; 2] = [-9999.0, 15.0 * (1_u128 << 119) as f64];
 
 /// How many samples there are of each binary order of magnitude: it tells which are outsized where the samples of a scan come
 /// piece by piece.
@@ -90,7 +42,10 @@ impl SampleSizes {
         }
     }
 
-    /// Size from which on samples are missing ([`MissingSamples::outsized`]); infinite if none is.
+    /// Size from which on samples are missing, infinite if none is: more than 2^20 times larger than the next smaller ones, where they are
+    /// less than half of all that are not 0.
+    ///
+    /// A single 1e308 or an unknown fill value would otherwise outweigh all windows of its region.
     #[must_use]
     pub fn outsized(&self) -> f64 {
         let all: usize = self.counts.iter().sum();
@@ -127,18 +82,34 @@ impl SampleSizes {
 
 /// Tells measured samples from missing ones.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rule<'a> {
-    fill: &'a [f64],
+pub(crate) struct Rule {
+    fill: &'static [f64],
     /// Samples of this size and above are missing.
     limit: f64,
 }
 
-impl Rule<'_> {
+impl Rule {
     /// Only samples that are not finite are missing.
-    pub(crate) const NOT_FINITE: Rule<'static> = Rule {
+    pub(crate) const NOT_FINITE: Self = Self {
         fill: &[],
         limit: f64::INFINITY,
     };
+
+    /// For a set of samples: [`FILL_VALUES`] are missing, and those that dwarf the others ([`SampleSizes::outsized`]).
+    pub(crate) fn of<S: Sample>(samples: impl Iterator<Item = S>) -> Self {
+        let filled = Self {
+            fill: &FILL_VALUES,
+            limit: f64::INFINITY,
+        };
+        let mut sizes = SampleSizes::default();
+        samples
+            .filter(|sample| filled.is_measured(*sample))
+            .for_each(|sample| sizes.add(sample.largest_part()));
+        Self {
+            limit: sizes.outsized(),
+            ..filled
+        }
+    }
 
     pub(crate) fn is_measured<S: Sample>(&self, sample: S) -> bool {
         sample.is_finite()
@@ -162,7 +133,7 @@ impl Rule<'_> {
 /// Which windows of a ray hold a missing sample; `None` if no one does.
 pub(crate) fn invalid_windows<S: Sample>(
     samples: impl Iterator<Item = S>,
-    rule: &Rule<'_>,
+    rule: &Rule,
     gates: &Gates,
     count: usize,
 ) -> Option<Vec<bool>> {
@@ -185,8 +156,7 @@ mod tests {
     use num_complex::Complex;
 
     fn measured(samples: &[f64]) -> Vec<bool> {
-        let missing = MissingSamples::default();
-        let rule = missing.rule(samples.iter().copied());
+        let rule = Rule::of(samples.iter().copied());
         samples
             .iter()
             .map(|sample| rule.is_measured(*sample))
@@ -222,19 +192,14 @@ mod tests {
         // the larger ones are the more: the small ones are residues of rounding
         assert_eq!(measured(&[1e-17, 1.0, -1.0, 0.5]), [true; 4]);
         assert_eq!(measured(&[0.0, 5.0]), [true; 2]);
-        let all = MissingSamples::not_finite();
-        assert!(
-            all.rule([1.0, 1e308].into_iter()).is_measured(1e308)
-                && !all.rule([1.0].into_iter()).is_measured(f64::NAN)
-        );
+        let all = Rule::NOT_FINITE;
+        assert!(all.is_measured(1e308) && !all.is_measured(f64::NAN));
     }
 
     #[test]
     fn scale_is_a_power_of_two_next_to_the_largest_sample() {
         fn scale<S: Sample>(samples: &[S]) -> f64 {
-            let missing = MissingSamples::default();
-            missing
-                .rule(samples.iter().copied())
+            Rule::of(samples.iter().copied())
                 .binary_scale(samples.iter().copied())
                 .unwrap_or(1.0)
         }

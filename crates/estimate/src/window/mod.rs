@@ -9,7 +9,7 @@ pub(crate) mod signal_kind;
 pub(crate) mod weighting;
 
 pub use gates::Gates;
-pub use missing::{MissingSamples, SampleSizes};
+pub use missing::{FILL_VALUES, SampleSizes};
 pub use sample::Sample;
 pub use sampling::{SPEED_OF_LIGHT_M_S, Sampling};
 pub use scratch::Scratch;

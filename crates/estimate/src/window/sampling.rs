@@ -139,18 +139,18 @@ impl Sampling {
             SignalKind::Complex => folded_hz,
         }
     }
-
-    /// Velocity \[m/s\] that a true velocity \[m/s\] reads after sampling, whatever the band.
-    #[must_use]
-    pub fn folded_velocity_m_s(&self, velocity_m_s: f64, kind: SignalKind) -> f64 {
-        self.velocity_m_s(self.folded_frequency_hz(self.frequency_hz(velocity_m_s), kind))
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+
+    /// Velocity that a true velocity reads after sampling, whatever the band.
+    fn reads_m_s(sampling: &Sampling, velocity_m_s: f64, kind: SignalKind) -> f64 {
+        let frequency_hz = sampling.frequency_hz(velocity_m_s);
+        sampling.velocity_m_s(sampling.folded_frequency_hz(frequency_hz, kind))
+    }
 
     fn table_2() -> Sampling {
         Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap()
@@ -182,24 +182,24 @@ mod tests {
     fn velocities_beyond_the_unambiguous_interval_fold() {
         let sampling = table_2();
         assert_relative_eq!(
-            sampling.folded_velocity_m_s(63.0, SignalKind::Real),
+            reads_m_s(&sampling, 63.0, SignalKind::Real),
             61.0,
             max_relative = 1e-12
         );
         assert_relative_eq!(
-            sampling.folded_velocity_m_s(100.0, SignalKind::Real),
+            reads_m_s(&sampling, 100.0, SignalKind::Real),
             24.0,
             max_relative = 1e-12
         );
         assert_relative_eq!(
-            sampling.folded_velocity_m_s(-12.0, SignalKind::Real),
+            reads_m_s(&sampling, -12.0, SignalKind::Real),
             -12.0,
             max_relative = 1e-12
         );
         let baseband = Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap();
         // complex samples repeat after F_s lambda / 2 = 193.75 m/s
         assert_relative_eq!(
-            baseband.folded_velocity_m_s(100.0, SignalKind::Complex),
+            reads_m_s(&baseband, 100.0, SignalKind::Complex),
             100.0 - 193.75,
             max_relative = 1e-12
         );

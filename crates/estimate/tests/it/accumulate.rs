@@ -403,35 +403,6 @@ fn fill_values_and_huge_samples_are_left_out_counted_and_leave_every_bit_of_the_
 }
 
 #[test]
-fn raw_counts_keep_minus_9999_if_the_rule_says_so() {
-    let mut counts = noise_records(5).mapv(|sample| (3000.0 * sample).round());
-    counts[[1, 170]] = -9999.0;
-    let of = |missing: &MissingSamples| {
-        Scan::without_missing(
-            &plan().statistic,
-            &table_2(),
-            &gates(),
-            &elevations_rad(),
-            counts.view(),
-            missing,
-        )
-        .unwrap()
-    };
-    let map = |scan: &Scan| {
-        scan.map(
-            &points(),
-            &Radius::Fixed { radius_m: 2.0 },
-            None,
-            &plan().estimator,
-        )
-        .unwrap()
-    };
-    let left_out = |scan: &Scan| map(scan).iter().map(|point| point.left_out).sum::<usize>();
-    assert!(left_out(&of(&MissingSamples::default())) > 0);
-    assert_eq!(left_out(&of(&MissingSamples::not_finite())), 0);
-}
-
-#[test]
 fn regions_without_windows_are_empty_and_say_so() {
     let scan = scan(&uniform_wind(), &elevations_rad());
     let correlation = WindowCorrelation::from_gate_lags(&[1.0, 0.9, 0.5]).unwrap();

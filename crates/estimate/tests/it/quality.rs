@@ -1,4 +1,4 @@
-//! What an estimate says of itself: spectral width, SNR, runner-up, and whether it can be trusted.
+//! What an estimate says of itself: spectral width, SNR, and whether it can be trusted.
 
 use crate::draw::{Draw, Windows};
 use crate::fixtures::{baseband, sigma_s, table_2};
@@ -291,22 +291,17 @@ fn weighted_windows_measure_width_and_snr_up_to_20_db() {
 }
 
 #[test]
-fn noise_alone_has_no_snr_and_a_runner_up_near_the_peak() {
+fn noise_alone_has_no_snr() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
     let mean = mean(&wind(200e-9, 1e-6), Weighting::Rectangular, 400, &mut rng);
     for (name, estimator) in estimators(&table_2(), SignalKind::Real) {
         let found = estimator.estimate(&mean, &mut Scratch::new());
         assert!(found.snr < 0.1 && found.quality < 1.4, "{name}: {found:?}");
-        let second = found.runner_up.unwrap();
-        assert!(
-            (0.75..=1.0).contains(&second.relative_density),
-            "{name}: {second:?}"
-        );
     }
 }
 
 #[test]
-fn two_targets_are_both_returned() {
+fn of_two_targets_the_stronger_is_returned() {
     let turn = |v_m_s: f64| std::f64::consts::TAU * table_2().frequency_hz(v_m_s) / 250e6;
     let real: Vec<f64> = (0..64)
         .map(f64::from)
@@ -314,13 +309,8 @@ fn two_targets_are_both_returned() {
         .collect();
     let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &PeriodogramOptions::default()).unwrap();
     let found = plan.velocity(&real, &mut Scratch::new()).unwrap();
-    let second = found.runner_up.unwrap();
-    assert!(
-        (found.velocity_m_s + 6.0).abs() < 0.3 && (second.velocity_m_s - 8.0).abs() < 0.3,
-        "{found:?}"
-    );
-    assert!((second.relative_density - 0.64).abs() < 0.1, "{second:?}");
-    // the same for all estimators, from a mean over phases in a little noise; 16 lags resolve 12 m/s
+    assert!((found.velocity_m_s + 6.0).abs() < 0.3, "{found:?}");
+    // the same for the other peaks, from a mean over phases in a little noise; 16 lags resolve 12 m/s
     let lag = |m: f64| {
         (turn(-10.0) * m).cos()
             + 0.64 * (turn(12.0) * m).cos()
@@ -332,10 +322,6 @@ fn two_targets_are_both_returned() {
         .collect();
     for (name, estimator) in estimators(&table_2(), SignalKind::Real) {
         let found = estimator.estimate(&lags, &mut Scratch::new());
-        let second_m_s = found
-            .runner_up
-            .map_or(f64::NAN, |second| second.velocity_m_s);
-        assert!((second_m_s - 12.0).abs() < 0.6, "{name}: {found:?}");
         if name != "pulse pair" {
             assert!((found.velocity_m_s + 10.0).abs() < 0.6, "{name}: {found:?}");
         }

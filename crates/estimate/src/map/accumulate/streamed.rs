@@ -31,7 +31,7 @@ pub struct ScanSums<'s, S, T: ?Sized> {
     numbers: usize,
     /// Statistics of each gate held, the pulses of a line added.
     rows: Vec<f64>,
-    rule: Rule<'s>,
+    rule: Rule,
     invalid: BTreeMap<usize, Vec<bool>>,
     /// Power of two by which the samples were divided; none before the first that is not 0.
     scale: Option<f64>,
@@ -98,7 +98,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     }
 
     /// The same with a rule for missing samples.
-    pub(super) fn with_rule(self, rule: Rule<'s>) -> Self {
+    pub(super) fn with_rule(self, rule: Rule) -> Self {
         Self { rule, ..self }
     }
 

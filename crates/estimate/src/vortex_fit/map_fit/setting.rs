@@ -9,7 +9,7 @@
 use ndarray::{Array1, Array2};
 
 use crate::error::{Error, enough_velocities, finite};
-use crate::vortex_fit::damped_newton::{Averaging, Stop, converged, halved};
+use crate::vortex_fit::damped_newton::{Stop, averaged, converged, halved};
 use crate::vortex_fit::map_fit::cells::{Cell, cells};
 use crate::vortex_fit::map_fit::data::{median, robust_scale};
 use crate::vortex_fit::map_fit::gates::Gates;
@@ -167,8 +167,9 @@ impl Setting<'_, '_> {
         counted: Option<f64>,
     ) -> Result<Linear, Error> {
         let (mut groups, mut released) = (all.to_vec(), false);
-        let (mut averaging, mut last, mut sigmas_left) =
-            (Averaging::default(), vec![0.0; p.len()], f64::INFINITY);
+        let mut turns = 0;
+        let mut last = vec![0.0; p.len()];
+        let mut sigmas_left = f64::INFINITY;
         let mut known: Option<Tangent> = None;
         let (mut alike, mut steps, mut most) = (counted.unwrap_or(1.0), 0, stop.iterations);
         while steps < most {
@@ -201,7 +202,7 @@ impl Setting<'_, '_> {
                     .collect::<Array1<f64>>()
             };
             let product = |a: &[f64], b: &[f64]| free(a).dot(&curvature.dot(&free(b)));
-            let share = averaging.part(product(&way, &last), product(&last, &last));
+            let share = averaged(&mut turns, product(&way, &last), product(&last, &last));
             sigmas_left = share * (product(&way, &way) / alike).sqrt();
             if sigmas_left <= stop.sigmas {
                 // a core that shrank on the way, as where the pair was narrow, may show where it ends

@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use wakescope_estimate::window::MissingSamples;
+use wakescope_estimate::window::FILL_VALUES;
 
 /// How the numbers of a file stand, as far as the file does not say it.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -182,7 +182,7 @@ impl RawRecords {
             fills: if are_integers {
                 Vec::new()
             } else {
-                MissingSamples::default().fill
+                FILL_VALUES.to_vec()
             },
             packed_scale: 1.0,
             scale: 1.0,
