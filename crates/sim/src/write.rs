@@ -92,7 +92,7 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
             .map(|estimates| beam_winds::beam_winds(plan, estimates))
             .transpose()?
             .flatten();
-        if matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_)) {
+        if matches!(pattern, Pattern::Vad { .. } | Pattern::Dbs { .. }) {
             files.table("wind", winds.as_deref(), |winds| {
                 Ok(beam_winds::table(winds))
             })?;

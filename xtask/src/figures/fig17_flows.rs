@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use wakescope_estimate::retrieval::VortexResult;
 use wakescope_sim::retrieve::{Method, RetrievalRow, name};
-use wakescope_sim::scene::{FirstMoment, Method as Estimator, Retrieval, VortexPair, Weighting};
+use wakescope_sim::scene::{Method as Estimator, Retrieval, VortexPair, Weighting};
 
 /// Ages of the simulated wake; the pair has none.
 const AGES: [Option<f64>; 4] = [None, Some(1.0), Some(2.5), Some(4.0)];
@@ -117,7 +117,7 @@ fn of_flow(context: &Context, tau: Option<f64>, wake: &FinishedWake) -> Result<O
     for row in retrieved(&scene, retrieval, &sight.folder)? {
         rows.push((row.method.name(), row));
     }
-    scene.estimator.method = Estimator::FirstMoment(FirstMoment::default());
+    scene.estimator.method = Estimator::FirstMoment { moment_reach: 3.5 };
     scene.estimator.weighting = Weighting::Rectangular;
     let of_means = Retrieval {
         methods: vec![Method::Rv],

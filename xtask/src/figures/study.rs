@@ -8,8 +8,8 @@ use wakescope_sim::io::csv::Column;
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::scene::{
-    Autoregressive, Flow, Method, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion,
-    Turbulence, VortexMotion, VortexPair, Weighting,
+    Flow, Method, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion, Turbulence,
+    VortexMotion, VortexPair, Weighting,
 };
 use wakescope_sim::setup::wind;
 use wakescope_sim::sweep;
@@ -50,7 +50,7 @@ pub(super) const METHODS: [&str; 3] = ["PA", "PA, Gaussian", "CA"];
 /// The scene with one of the [`METHODS`].
 pub(super) fn with_method(mut scene: Scene, method: &str) -> Scene {
     scene.estimator.method = match method {
-        "CA" => Method::Autoregressive(Autoregressive::default()),
+        "CA" => Method::Autoregressive { order: 16 },
         _ => Method::PeriodogramAccumulation {},
     };
     scene.estimator.weighting = if method == METHODS[1] {

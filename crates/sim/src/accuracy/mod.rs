@@ -66,7 +66,10 @@ impl Request {
     /// One that the scene does not have.
     fn figures(&self, own: &Plan) -> Result<Vec<Figure>, Error> {
         let scene = &own.scene.content;
-        let tells_winds = matches!(scene.scan.pattern, Pattern::Vad(_) | Pattern::Dbs(_));
+        let tells_winds = matches!(
+            scene.scan.pattern,
+            Pattern::Vad { .. } | Pattern::Dbs { .. }
+        );
         let lacking = |figure: Figure| match figure {
             Figure::U | Figure::V | Figure::W if !tells_winds => {
                 Some("is a wind of scan.pattern.kind = \"vad\" or \"dbs\" alone")

@@ -117,11 +117,11 @@ macro_rules! table {
     };
 }
 
-/// A table whose keys depend on the one named after `by`: each kind is a table of its own, or lists keys without defaults.
+/// A table whose keys depend on the one named after `by`: each kind is a table of its own, or lists its keys, with or without defaults.
 macro_rules! kinds {
     ($(#[$doc:meta])* $name:ident by $tag:literal {
         $($(#[$vdoc:meta])* $word:literal => $variant:ident $(($inner:ty))? $({
-            $($(#[$fdoc:meta])* $field:ident: $ty:ty $(=> $limit:expr)*),* $(,)?
+            $($(#[$fdoc:meta])* $field:ident: $ty:ty $(= $default:expr)? $(=> $limit:expr)*),* $(,)?
         })?,)*
     }) => {
         $(#[$doc])*
@@ -139,7 +139,7 @@ macro_rules! kinds {
             fn kind() -> $crate::keys::Kind {
                 $crate::keys::Kind::Tagged { tag: $tag, kinds: vec![$((
                     $word,
-                    vec![$($($crate::keys::Key::of::<$ty>(stringify!($field), false),)*)?]
+                    vec![$($($crate::keys::Key::of::<$ty>(stringify!($field), $crate::keys::default_of!($ty $(, $default)?).is_some()),)*)?]
                         $(.into_iter().chain($crate::keys::keys_of::<$inner>()).collect())?,
                 ),)*] }
             }
@@ -147,7 +147,7 @@ macro_rules! kinds {
                 match value.get($tag)?.as_str()? {
                     $($word => Some(Self::$variant
                         $((<$inner as $crate::keys::Declared>::from_value(value)?))?
-                        $({ $($field: $crate::keys::read_key(value, stringify!($field), <$ty as $crate::keys::Declared>::absent)?),* })?
+                        $({ $($field: $crate::keys::read_key(value, stringify!($field), || $crate::keys::default_of!($ty $(, $default)?))?),* })?
                     ),)*
                     _ => None,
                 }
@@ -203,6 +203,16 @@ macro_rules! choice {
     };
 }
 
+/// The default of a key of a kind; without one, what its absence means.
+macro_rules! default_of {
+    ($ty:ty, $default:expr) => {
+        Some::<$ty>($default)
+    };
+    ($ty:ty) => {
+        <$ty as $crate::keys::Declared>::absent()
+    };
+}
+
 /// Writes a key of a table; one that is omitted only where it does not have its default.
 macro_rules! written {
     ($table:ident, $name:expr, $value:expr, $default:expr, omitted) => {
@@ -254,7 +264,7 @@ macro_rules! foreign_choices {
     };
 }
 
-pub(crate) use {choice, foreign_choices, held, keys, kinds, second, table, written};
+pub(crate) use {choice, default_of, foreign_choices, held, keys, kinds, second, table, written};
 
 impl Declared for f64 {
     fn kind() -> Kind {

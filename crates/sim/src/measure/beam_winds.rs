@@ -42,7 +42,7 @@ pub struct BeamWind {
 /// What the estimators or the wind refuse; a checked scene gives none.
 pub fn beam_winds(plan: &Plan, map: &VelocityEstimates) -> Result<Option<Vec<BeamWind>>, Error> {
     let pattern = &plan.scene.content.scan.pattern;
-    if !matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_)) {
+    if !matches!(pattern, Pattern::Vad { .. } | Pattern::Dbs { .. }) {
         return Ok(None);
     }
     let mut out = Vec::with_capacity(plan.geometry.schedule.sweeps.len() * map.range_m.len());
@@ -104,7 +104,7 @@ pub(crate) fn mean_wind_m_s(
     velocity_m_s: &Array2<f64>,
 ) -> Result<Option<[f64; 3]>, Error> {
     let pattern = &plan.scene.content.scan.pattern;
-    if !matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_)) {
+    if !matches!(pattern, Pattern::Vad { .. } | Pattern::Dbs { .. }) {
         return Ok(None);
     }
     let (mut sum, mut count) = ([0.0; 3], 0.0);
@@ -133,17 +133,17 @@ fn wind_of(
 ) -> Result<([f64; 3], [f64; 3]), Error> {
     let unknown = [f64::NAN; 3];
     match (pattern, seen_m_s) {
-        (Pattern::Dbs(dbs), &[north, east, south, west, up]) => {
-            let swung = swing(dbs.elevation_rad, [north, east, south, west])?;
+        (Pattern::Dbs { elevation_rad }, &[north, east, south, west, up]) => {
+            let swung = swing(*elevation_rad, [north, east, south, west])?;
             let [along, across] = swung.horizontal_m_s;
             // From north and east to the axes of the scene: those of the first two beams.
             let horizontal = |d: usize| {
-                let unit = |beam: usize| direction[beam][d] / dbs.elevation_rad.cos();
+                let unit = |beam: usize| direction[beam][d] / elevation_rad.cos();
                 along * unit(0) + across * unit(1)
             };
             Ok(([horizontal(0), horizontal(1), up], unknown))
         }
-        (Pattern::Dbs(_), _) => Ok((unknown, unknown)),
+        (Pattern::Dbs { .. }, _) => Ok((unknown, unknown)),
         _ => Ok(
             fit_wind(direction, seen_m_s)?.map_or((unknown, unknown), |fit| {
                 (fit.velocity_m_s, fit.standard_deviation_m_s())

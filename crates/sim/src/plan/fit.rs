@@ -36,7 +36,7 @@ impl Plan {
         let scene = &self.scene.content;
         let lines = match scene.scan.pattern {
             Pattern::Rhi {} => "a larger scan.elevation_step_rad",
-            Pattern::Ppi(_) | Pattern::Axial(_) => "a larger scan.pattern.azimuth_step_rad",
+            Pattern::Ppi { .. } | Pattern::Axial { .. } => "a larger scan.pattern.azimuth_step_rad",
             _ => "fewer lines of sight",
         };
         let is_derived = matches!(scene.atmosphere.turbulence, Turbulence::Refractive(t) if t.sampling == ScreenSampling::Derived);

@@ -193,7 +193,7 @@ const MAP_POINT_BYTES: f64 = 88.0;
 fn planning(scene: &Scene, n: &Sizes) -> (f64, f64) {
     let matrix_bytes = n.window.powi(2) * 8.0;
     let (kept_matrices, matrices) = match scene.estimator.method {
-        Method::Likelihood(_) => (1.0, 8.0),
+        Method::Likelihood { .. } => (1.0, 8.0),
         _ => (0.0, 0.0),
     };
     let has_bound = matches!(scene.estimator.radius, RegionRadius::Target { .. });

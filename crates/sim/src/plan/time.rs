@@ -70,7 +70,7 @@ fn maps_s(scene: &Scene, n: &Sizes) -> f64 {
     let spectrum_s = n.frequencies * (6e-9 + n.numbers.min(n.window) * 6e-11);
     // Of a window and of a point, and covariances that are decomposed.
     let (window_s, point_s, covariances) = match e.method {
-        Method::Likelihood(_) => {
+        Method::Likelihood { .. } => {
             // As many tapers as a window has independent parts, about.
             let parts = n.window / (scene.detector.sampling_hz * scene.pulse_sigma_s()).max(1.0);
             (numbers_s * (2.0 + 0.5 * parts), spectrum_s, 1.0)

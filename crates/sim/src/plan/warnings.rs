@@ -25,7 +25,10 @@ pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, E
              to {off_m_s:.3} m/s off"
         ));
     }
-    let is_model = matches!(method, Method::Autoregressive(_) | Method::FirstMoment(_));
+    let is_model = matches!(
+        method,
+        Method::Autoregressive { .. } | Method::FirstMoment { .. }
+    );
     if is_model && e.weighting != Weighting::Rectangular {
         let meant = "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\"";
         out.push(meant.into());

@@ -171,7 +171,7 @@ impl Scene {
             c.between(core_m < 0.5 * spacing_m, &sides);
         }
         self.check_band(c);
-        if matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Axial(_)) {
+        if matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Axial { .. }) {
             self.check_lines(c);
         }
         self.check_scan_between(c);

@@ -43,34 +43,22 @@ keys! {
         /// PA: mean periodogram of all windows of the region (Table 3).
         "periodogram_accumulation" => PeriodogramAccumulation {},
         /// CA: peak of the autoregressive spectrum of the mean correlogram (Table 3).
-        "autoregressive" => Autoregressive(Autoregressive),
+        "autoregressive" => Autoregressive {
+            /// Order of the model.
+            order: usize = 16 => 1..=65_535,
+        },
         /// Phase of the first lag.
         "pulse_pair" => PulsePair {},
         /// Mean of the main peak of the spectrum.
-        "first_moment" => FirstMoment(FirstMoment),
+        "first_moment" => FirstMoment {
+            /// Half width of the part of the spectrum that is averaged, in its standard deviations.
+            moment_reach: f64 = 3.5 => 0.1..=100.0,
+        },
         /// Maximum likelihood of the velocity for the known pulse, by tapers.
-        "likelihood" => Likelihood(Likelihood),
-    }
-
-    /// The autoregressive model.
-    #[derive(Copy)]
-    table Autoregressive {
-        /// Order of the model.
-        order: usize = 16 => 1..=65_535,
-    }
-
-    /// The first moment of a peak.
-    #[derive(Copy)]
-    table FirstMoment {
-        /// Half width of the part of the spectrum that is averaged, in its standard deviations.
-        moment_reach: f64 = 3.5 => 0.1..=100.0,
-    }
-
-    /// The likelihood of the velocity.
-    #[derive(Copy)]
-    table Likelihood {
-        /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
-        likelihood_snr_db: Option<f64> = None => -100.0..=100.0,
+        "likelihood" => Likelihood {
+            /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
+            likelihood_snr_db: Option<f64> => -100.0..=100.0,
+        },
     }
 
     /// How the radius of the region depends on range.
@@ -151,13 +139,13 @@ impl Estimator {
 impl Method {
     /// Whether tapers of its own take the place of the weighting of the windows.
     pub(crate) fn has_own_tapers(&self) -> bool {
-        matches!(self, Self::Likelihood(_))
+        matches!(self, Self::Likelihood { .. })
     }
 
     /// The order of the model that the method fits, if it fits one.
     pub fn order(&self) -> Option<usize> {
         match self {
-            Self::Autoregressive(model) => Some(model.order),
+            Self::Autoregressive { order } => Some(*order),
             _ => None,
         }
     }
@@ -165,7 +153,7 @@ impl Method {
     /// Signal-to-noise ratio for which a likelihood is planned, dB, if the scene states one.
     pub fn likelihood_snr_db(&self) -> Option<f64> {
         match self {
-            Self::Likelihood(own) => own.likelihood_snr_db,
+            Self::Likelihood { likelihood_snr_db } => *likelihood_snr_db,
             _ => None,
         }
     }
@@ -215,32 +203,23 @@ mod tests {
     #[test]
     fn knobs_of_the_estimators_are_held_to_their_limits() {
         let own = |method| keys(|e| e.method = method);
-        let order = Autoregressive { order: 64 };
-        assert_eq!(
-            own(Method::Autoregressive(order)),
-            ["estimator.method.order"]
-        );
-        let reach = FirstMoment {
+        let order = Method::Autoregressive { order: 64 };
+        assert_eq!(own(order), ["estimator.method.order"]);
+        let reach = Method::FirstMoment {
             moment_reach: f64::NAN,
         };
-        assert_eq!(
-            own(Method::FirstMoment(reach)),
-            ["estimator.method.moment_reach"]
-        );
-        let strong = Likelihood {
+        assert_eq!(own(reach), ["estimator.method.moment_reach"]);
+        let strong = Method::Likelihood {
             likelihood_snr_db: Some(200.0),
         };
-        assert_eq!(
-            own(Method::Likelihood(strong)),
-            ["estimator.method.likelihood_snr_db"]
-        );
+        assert_eq!(own(strong), ["estimator.method.likelihood_snr_db"]);
         let with = |method, change: fn(&mut Estimator)| {
             keys(|e| {
                 e.method = method;
                 change(e);
             })
         };
-        let model = Method::Autoregressive(Autoregressive::default());
+        let model = Method::Autoregressive { order: 16 };
         assert_eq!(
             with(model, |e| e.false_alarm = 1.0),
             ["estimator.false_alarm"]

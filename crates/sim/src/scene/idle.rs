@@ -19,7 +19,7 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
             found.extend(keys.iter().map(|key| (*key, purpose.clone())));
         }
     };
-    let without_peak = matches!(method, Method::PulsePair {} | Method::FirstMoment(_));
+    let without_peak = matches!(method, Method::PulsePair {} | Method::FirstMoment { .. });
     unused(
         without_peak,
         &["estimator.refinement"],
@@ -101,7 +101,7 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
         "scan.pattern.kind = \"{}\" has angles of its own",
         scan.pattern.name()
     );
-    let rows = matches!(scan.pattern, Pattern::Rhi {} | Pattern::Axial(_));
+    let rows = matches!(scan.pattern, Pattern::Rhi {} | Pattern::Axial { .. });
     unused(
         !rows,
         &["scan.elevation_min_rad", "scan.elevation_max_rad"],
@@ -109,7 +109,7 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
     );
     unused(!rows, &["scan.elevation_step_rad"], angles.clone());
     unused(
-        !matches!(scan.pattern, Pattern::Rhi {} | Pattern::Stare(_)),
+        !matches!(scan.pattern, Pattern::Rhi {} | Pattern::Stare { .. }),
         &["scan.azimuth_rad"],
         angles,
     );

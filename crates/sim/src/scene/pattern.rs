@@ -12,72 +12,53 @@ keys! {
         /// Upwards in one vertical plane, by the elevations of `[scan]`.
         "rhi" => Rhi {},
         /// Round at one elevation or several.
-        "ppi" => Ppi(Ppi),
+        "ppi" => Ppi {
+            /// Elevation of each sweep, rad.
+            elevations_rad: Vec<f64> = vec![0.05]
+                => Is(|list: &Vec<f64>| (1..=1000).contains(&list.len()), "a list of 1 to 1000 elevations")
+                => -FRAC_PI_2..=FRAC_PI_2,
+            /// First azimuth, rad.
+            azimuth_min_rad: f64 = 0.0 => -TAU..=TAU,
+            /// Last azimuth, rad; a full turn from the first ends one step before it.
+            azimuth_max_rad: f64 = TAU => -TAU..=2.0 * TAU,
+            /// Angle between lines, rad; a head that moves during a line has its own.
+            azimuth_step_rad: f64 = TAU / 360.0 => 1e-7..=PI,
+        },
         /// Turns of evenly spaced beams on a cone.
-        "vad" => Vad(Vad),
+        "vad" => Vad {
+            /// Elevation of the beams, rad.
+            elevation_rad: f64 = FRAC_PI_3 => 1e-3..=FRAC_PI_2 - 1e-3,
+            /// Beams of a turn.
+            beams: usize = 24 => 4..=10_000,
+        },
         /// Four slanted beams and one straight up.
-        "dbs" => Dbs(Dbs),
+        "dbs" => Dbs {
+            /// Elevation of the slanted beams, rad.
+            elevation_rad: f64 = 62.0 * PI / 180.0 => 1e-3..=FRAC_PI_2 - 1e-3,
+        },
         /// One direction, line after line.
-        "stare" => Stare(Stare),
+        "stare" => Stare {
+            /// Elevation, rad.
+            elevation_rad: f64 = FRAC_PI_2 => -FRAC_PI_2..=FRAC_PI_2,
+            /// Lines, one after the other.
+            lines: usize = 60 => 1..=100_000,
+        },
         /// Rows of elevation about the flight path, by the elevations of `[scan]`.
-        "axial" => Axial(Axial),
+        "axial" => Axial {
+            /// Towards which end of the flight path the lidar looks.
+            towards: Towards = Towards::PlusX,
+            /// First azimuth beside the path, rad.
+            azimuth_min_rad: f64 = -0.05 => -TAU..=TAU,
+            /// Last azimuth beside the path, rad.
+            azimuth_max_rad: f64 = 0.05 => -TAU..=2.0 * TAU,
+            /// Angle between lines of a row, rad.
+            azimuth_step_rad: f64 = 5e-3 => 1e-7..=PI,
+        },
         /// Lines from a file.
         "list" => List {
             /// The file, relative to the folder of the scene: CSV, or lines of HALO's step-stare scans.
             file: String => Named("the name of a file with the lines of the scan"),
         },
-    }
-
-    /// Sweeps of azimuth.
-    table Ppi {
-        /// Elevation of each sweep, rad.
-        elevations_rad: Vec<f64> = vec![0.05]
-            => Is(|list: &Vec<f64>| (1..=1000).contains(&list.len()), "a list of 1 to 1000 elevations")
-            => -FRAC_PI_2..=FRAC_PI_2,
-        /// First azimuth, rad.
-        azimuth_min_rad: f64 = 0.0 => -TAU..=TAU,
-        /// Last azimuth, rad; a full turn from the first ends one step before it.
-        azimuth_max_rad: f64 = TAU => -TAU..=2.0 * TAU,
-        /// Angle between lines, rad; a head that moves during a line has its own.
-        azimuth_step_rad: f64 = TAU / 360.0 => 1e-7..=PI,
-    }
-
-    /// Turns of beams on a cone.
-    #[derive(Copy)]
-    table Vad {
-        /// Elevation of the beams, rad.
-        elevation_rad: f64 = FRAC_PI_3 => 1e-3..=FRAC_PI_2 - 1e-3,
-        /// Beams of a turn.
-        beams: usize = 24 => 4..=10_000,
-    }
-
-    /// Doppler beam swinging.
-    #[derive(Copy)]
-    table Dbs {
-        /// Elevation of the slanted beams, rad.
-        elevation_rad: f64 = 62.0 * PI / 180.0 => 1e-3..=FRAC_PI_2 - 1e-3,
-    }
-
-    /// One direction, at the azimuth of `[scan]`.
-    #[derive(Copy)]
-    table Stare {
-        /// Elevation, rad.
-        elevation_rad: f64 = FRAC_PI_2 => -FRAC_PI_2..=FRAC_PI_2,
-        /// Lines, one after the other.
-        lines: usize = 60 => 1..=100_000,
-    }
-
-    /// A raster about the flight path, seen from behind or from the front.
-    #[derive(Copy)]
-    table Axial {
-        /// Towards which end of the flight path the lidar looks.
-        towards: Towards = Towards::PlusX,
-        /// First azimuth beside the path, rad.
-        azimuth_min_rad: f64 = -0.05 => -TAU..=TAU,
-        /// Last azimuth beside the path, rad.
-        azimuth_max_rad: f64 = 0.05 => -TAU..=2.0 * TAU,
-        /// Angle between lines of a row, rad.
-        azimuth_step_rad: f64 = 5e-3 => 1e-7..=PI,
     }
 
     /// An end of the flight path.
@@ -178,7 +159,7 @@ impl Scene {
         let pattern = self.scan.pattern.name();
         let turning = matches!(
             self.scan.pattern,
-            Pattern::Rhi {} | Pattern::Ppi(_) | Pattern::Axial(_)
+            Pattern::Rhi {} | Pattern::Ppi { .. } | Pattern::Axial { .. }
         );
         let allowed = format!(
             "\"stepped\" with scan.pattern.kind = \"{pattern}\"; rhi, ppi and axial may be continuous"
@@ -191,7 +172,7 @@ impl Scene {
             rate_rad_s,
             finite,
         );
-        let sweeping = matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Ppi(_));
+        let sweeping = matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Ppi { .. });
         let back = direction == SweepDirection::Alternate;
         let allowed = format!(
             "\"same\" with scan.pattern.kind = \"{pattern}\"; rhi and ppi may go back and forth"
@@ -215,8 +196,16 @@ impl Scene {
     pub(super) fn check_scan_between(&self, c: &mut Checker<'_>) {
         let s = &self.scan;
         let azimuths = match &s.pattern {
-            Pattern::Ppi(p) => Some((p.azimuth_min_rad, p.azimuth_max_rad, TAU)),
-            Pattern::Axial(p) => Some((p.azimuth_min_rad, p.azimuth_max_rad, FRAC_PI_2)),
+            Pattern::Ppi {
+                azimuth_min_rad,
+                azimuth_max_rad,
+                ..
+            } => Some((*azimuth_min_rad, *azimuth_max_rad, TAU)),
+            Pattern::Axial {
+                azimuth_min_rad,
+                azimuth_max_rad,
+                ..
+            } => Some((*azimuth_min_rad, *azimuth_max_rad, FRAC_PI_2)),
             _ => None,
         };
         if let Some((low_rad, high_rad, most_rad)) = azimuths {
@@ -236,21 +225,27 @@ impl Scene {
         let across = "scan.pattern.azimuth_step_rad";
         let (turn_rad, step_rad, rows, key) = match &s.pattern {
             Pattern::Rhi {} => (up_rad, s.elevation_step_rad, 1.0, "scan.elevation_step_rad"),
-            Pattern::Ppi(p) => (
+            Pattern::Ppi {
+                elevations_rad,
+                azimuth_step_rad,
+                ..
+            } => (
                 across_rad,
-                p.azimuth_step_rad,
-                p.elevations_rad.len() as f64,
+                *azimuth_step_rad,
+                elevations_rad.len() as f64,
                 across,
             ),
-            Pattern::Axial(p) => (
+            Pattern::Axial {
+                azimuth_step_rad, ..
+            } => (
                 across_rad,
-                p.azimuth_step_rad,
+                *azimuth_step_rad,
                 up_rad / s.elevation_step_rad + 1.0,
                 across,
             ),
-            Pattern::Vad(p) => (p.beams as f64 - 1.0, 1.0, 1.0, "scan.pattern.beams"),
-            Pattern::Stare(p) => (p.lines as f64 - 1.0, 1.0, 1.0, "scan.pattern.lines"),
-            Pattern::Dbs(_) => (4.0, 1.0, 1.0, "scan.head.sweeps"),
+            Pattern::Vad { beams, .. } => (*beams as f64 - 1.0, 1.0, 1.0, "scan.pattern.beams"),
+            Pattern::Stare { lines, .. } => (*lines as f64 - 1.0, 1.0, 1.0, "scan.pattern.lines"),
+            Pattern::Dbs { .. } => (4.0, 1.0, 1.0, "scan.head.sweeps"),
             Pattern::List { .. } => return,
         };
         let line_rad =

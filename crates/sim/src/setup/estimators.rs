@@ -124,7 +124,7 @@ const NOISE_FLOOR: f64 = 1e-6;
 /// What the estimators refuse, such as a covariance that cannot be diagonalised.
 fn correlogram<S: Sample>(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Correlogram<S>, Error> {
     let n = scene.estimator.window_samples;
-    if !matches!(scene.estimator.method, Method::Likelihood(_)) {
+    if !matches!(scene.estimator.method, Method::Likelihood { .. }) {
         return Ok(Correlogram::new(weighting(scene), n)?);
     }
     let correlation = pulse_correlation(scene, pulse);
@@ -479,7 +479,7 @@ fn of_correlogram(
     let (e, sampling) = (&scene.estimator, sampling(scene)?);
     let (padded, refinement) = (e.padded_samples, e.refinement);
     Ok(match e.method {
-        Method::Periodogram {} | Method::PeriodogramAccumulation {} | Method::Likelihood(_) => {
+        Method::Periodogram {} | Method::PeriodogramAccumulation {} | Method::Likelihood { .. } => {
             Box::new(SpectralPeak::new(
                 &sampling,
                 kind,
@@ -488,21 +488,21 @@ fn of_correlogram(
                 refinement,
             )?)
         }
-        Method::Autoregressive(own) => Box::new(ModelPeak::new(
+        Method::Autoregressive { order } => Box::new(ModelPeak::new(
             &sampling,
             kind,
             lag_weights.len(),
-            own.order,
+            order,
             padded,
             refinement,
         )?),
         Method::PulsePair {} => Box::new(PulsePair::new(&sampling, kind, lag_weights)?),
-        Method::FirstMoment(own) => Box::new(FirstMoment::new(
+        Method::FirstMoment { moment_reach } => Box::new(FirstMoment::new(
             &sampling,
             kind,
             lag_weights,
             padded,
-            own.moment_reach,
+            moment_reach,
         )?),
     })
 }

@@ -84,29 +84,45 @@ fn stops(scene: &Scene) -> Vec<Stop> {
                 moving,
             )]
         }
-        Pattern::Ppi(p) => {
+        Pattern::Ppi {
+            elevations_rad,
+            azimuth_min_rad,
+            azimuth_max_rad,
+            azimuth_step_rad,
+        } => {
             let row = |el: &f64| {
                 path::ppi(
                     *el,
-                    p.azimuth_min_rad,
-                    p.azimuth_max_rad,
-                    p.azimuth_step_rad,
+                    *azimuth_min_rad,
+                    *azimuth_max_rad,
+                    *azimuth_step_rad,
                     moving,
                 )
             };
-            p.elevations_rad.iter().map(row).collect()
+            elevations_rad.iter().map(row).collect()
         }
-        Pattern::Vad(p) => vec![path::vad(p.elevation_rad, p.beams)],
-        Pattern::Dbs(p) => vec![path::dbs(p.elevation_rad)],
-        Pattern::Stare(p) => vec![path::stare(s.azimuth_rad, p.elevation_rad, p.lines)],
-        Pattern::Axial(p) => {
+        Pattern::Vad {
+            elevation_rad,
+            beams,
+        } => vec![path::vad(*elevation_rad, *beams)],
+        Pattern::Dbs { elevation_rad } => vec![path::dbs(*elevation_rad)],
+        Pattern::Stare {
+            elevation_rad,
+            lines,
+        } => vec![path::stare(s.azimuth_rad, *elevation_rad, *lines)],
+        Pattern::Axial {
+            towards,
+            azimuth_min_rad,
+            azimuth_max_rad,
+            azimuth_step_rad,
+        } => {
             let (zero_rad, from_x_rad) = mount(scene).reference_rad;
             let along_rad = zero_rad - from_x_rad;
-            let axis_rad = along_rad + if p.towards == Towards::PlusX { 0.0 } else { PI };
+            let axis_rad = along_rad + if *towards == Towards::PlusX { 0.0 } else { PI };
             path::raster(
                 axis_rad,
                 &rows(),
-                [p.azimuth_min_rad, p.azimuth_max_rad, p.azimuth_step_rad],
+                [*azimuth_min_rad, *azimuth_max_rad, *azimuth_step_rad],
                 moving,
             )
         }
@@ -140,8 +156,8 @@ fn above_ground(file: &SceneFile, scan: &Schedule) -> Result<(), Error> {
         return Ok(());
     };
     let key = match &s.pattern {
-        Pattern::Rhi {} | Pattern::Axial(_) => "scan.elevation_min_rad",
-        Pattern::Ppi(_) => "scan.pattern.elevations_rad",
+        Pattern::Rhi {} | Pattern::Axial { .. } => "scan.elevation_min_rad",
+        Pattern::Ppi { .. } => "scan.pattern.elevations_rad",
         Pattern::List { .. } => "scan.pattern.file",
         _ => "scan.pattern.elevation_rad",
     };

@@ -233,7 +233,12 @@ mod tests {
                     ..Default::default()
                 });
             },
-            |scene| scene.scan.pattern = crate::scene::Pattern::Ppi(crate::scene::Ppi::default()),
+            |scene| {
+                scene.scan.pattern = crate::scene::Pattern::Stare {
+                    elevation_rad: 0.1,
+                    lines: 60,
+                }
+            },
             |scene| scene.scan.head.sweeps = 2,
         ] {
             let plan = plan(change);
