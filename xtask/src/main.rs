@@ -1,5 +1,6 @@
 //! Tasks of the wakescope workspace: `cargo xtask --help`.
 
+#![warn(clippy::too_many_lines, clippy::type_complexity)]
 // A task talks to a person at a terminal.
 #![allow(clippy::print_stdout)]
 

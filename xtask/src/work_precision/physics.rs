@@ -45,21 +45,20 @@ fn phase_screens<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
     settings(knob, &[128.0, 256.0, 512.0], |points| {
         let points = points as usize;
         let (generator, set_up) = measured(|| {
-            Ok(ScreenGenerator::<T>::new(
-                Grid::square(points, 2e-3)?,
-                Arc::clone(&spectrum),
-            )?)
+            let grid = Grid::square(points, 2e-3)?;
+            Ok(ScreenGenerator::<T>::new(grid, Arc::clone(&spectrum))?)
         })?;
         let mut worst = 0.0_f64;
-        for steps in [2, 4, 8, 16, 32, 64, 128, 256]
-            .into_iter()
-            .filter(|&steps| steps <= points / 2)
-        {
+        for steps in [2, 4, 8, 16, 32, 64, 128, 256] {
+            if steps > points / 2 {
+                break;
+            }
             let exact = structure_function_m53(&*spectrum, steps as f64 * 2e-3)?;
             worst = worst.max((generator.expected_structure_m53(steps, 0) / exact - 1.0).abs());
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        let (mut work, mut first) = (generator.work(), vec![T::zero(); points * points]);
+        let mut work = generator.work();
+        let mut first = vec![T::zero(); points * points];
         let mut second = first.clone();
         let ((), cost) =
             fastest(|| Ok(generator.fill_pair(&mut rng, &mut work, &mut first, &mut second)?))?;
@@ -84,18 +83,17 @@ fn free_space<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
 /// The bias of five layers by exact theory and the standard error of a mean, which falls from that of one run; the time is that of a
 /// realisation, the difference of a long and a short run, so that the set-up stands apart.
 fn bistatic(quick: bool) -> Result<Vec<Row>, Failure> {
-    let (few, many) = (40, if quick { 200 } else { 800 });
+    let few = 40;
+    let many = if quick { 200 } else { 800 };
     let bias = layers_bias(5)?;
-    let of =
-        |realisations| measured(|| Ok(screens(5, Grid::square(256, 4e-3)?)?.run(realisations)?));
-    let (short, long) = (of(few)?, of(many)?);
-    let one = long.1.less(short.1).scaled(1.0 / (many - few) as f64);
+    let (_, short_cost) = measured(|| Ok(screens(5, Grid::square(256, 4e-3)?)?.run(few)?))?;
+    let (long, long_cost) = measured(|| Ok(screens(5, Grid::square(256, 4e-3)?)?.run(many)?))?;
+    let one = long_cost.less(short_cost).scaled(1.0 / (many - few) as f64);
     let found = long
-        .0
         .bistatic
         .ok_or_else(|| Failure::new("the run gave no bistatic efficiency".into()))?;
     let deviation = found.standard_error[0] / found.mean[0] * (many as f64).sqrt();
-    let set_up_s = (short.1.cpu_s - few as f64 * one.cpu_s).max(0.0);
+    let set_up_s = (short_cost.cpu_s - few as f64 * one.cpu_s).max(0.0);
     let knob = [
         "bistatic efficiency",
         "5 layers, 256 points",
@@ -119,21 +117,16 @@ const DRAWN_REALISATIONS: [f64; 6] = [50.0, 200.0, 800.0, 3200.0, 12800.0, 51200
 
 /// What a finite number of screens in the middles of their layers does to the bistatic efficiency, relative, by exact theory.
 pub(super) fn layers_bias(count: usize) -> Result<f64, Failure> {
-    let (telescope, turbulence, none) = (
-        Telescope::table2(),
-        Turbulence::table2(CN2_M_M23)?,
-        Misalignment::NONE,
-    );
+    let telescope = Telescope::table2();
+    let turbulence = Turbulence::table2(CN2_M_M23)?;
+    let none = Misalignment::NONE;
     let table = StructureTable::new(&*turbulence.spectrum);
     let continuous =
         theory::bistatic_efficiency_with(&telescope, &none, &turbulence.cn2, &table, RANGE_M)?;
     let layers = Layers::equal(count, RANGE_M)?.screens_to(RANGE_M, &turbulence.cn2)?;
-    Ok(
-        (theory::bistatic_efficiency_screens(&telescope, &none, &layers, &table, RANGE_M)?
-            / continuous
-            - 1.0)
-            .abs(),
-    )
+    let discrete =
+        theory::bistatic_efficiency_screens(&telescope, &none, &layers, &table, RANGE_M)?;
+    Ok((discrete / continuous - 1.0).abs())
 }
 
 fn screens(layers: usize, grid: Grid) -> Result<MonteCarlo, Failure> {
@@ -159,7 +152,8 @@ pub(super) fn les(quick: bool) -> Result<Vec<Row>, Failure> {
             few(&[1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12], quick),
             |tolerance| {
                 let mut case = cases::taylor_green_3d(32, 1600.0)?;
-                (case.settings.pressure, case.settings.pressure_tolerance) = (pressure, tolerance);
+                case.settings.pressure = pressure;
+                case.settings.pressure_tolerance = tolerance;
                 let (divergence, cost) = fastest(|| {
                     let mut flow = case.start()?.0;
                     for _ in 0..10 {
@@ -177,17 +171,19 @@ pub(super) fn les(quick: bool) -> Result<Vec<Row>, Failure> {
 /// Energy is compared over so long to either side \[s\].
 const APART_S: f64 = 0.2;
 
+/// The rate at which energy is lost, from output to output.
+fn lost_energy(energy: &[f64]) -> Vec<f64> {
+    energy
+        .windows(3)
+        .map(|e| (e[0] - e[2]) / (2.0 * APART_S))
+        .collect()
+}
+
 /// The rate at which the vortices lose energy until t = 10, root mean square error over the peak.
 fn taylor_green(quick: bool) -> Result<Vec<Row>, Failure> {
     let stored = numbers("tgv_re200_fourier96.csv")?;
     let reference: Vec<f64> = stored.iter().step_by(2).map(|row| row[1]).collect();
-    let lost = |energy: &[f64]| -> Vec<f64> {
-        energy
-            .windows(3)
-            .map(|e| (e[0] - e[2]) / (2.0 * APART_S))
-            .collect()
-    };
-    let exact = lost(&reference);
+    let exact = lost_energy(&reference);
     let peak = exact.iter().copied().fold(0.0, f64::max);
     // Steps that divide the outputs, at a Courant number of about one half.
     let cells: &[f64] = if quick {
@@ -218,12 +214,9 @@ fn taylor_green(quick: bool) -> Result<Vec<Row>, Failure> {
             }
             Ok(energy)
         })?;
-        let squares: f64 = lost(&energy)
-            .iter()
-            .zip(&exact)
-            .map(|(a, b)| (a - b).powi(2))
-            .sum();
-        let error = (squares / exact.len() as f64).sqrt() / peak;
+        let lost = lost_energy(&energy);
+        let squares = lost.iter().zip(&exact).map(|(a, b)| (a - b).powi(2));
+        let error = (squares.sum::<f64>() / exact.len() as f64).sqrt() / peak;
         Ok(Found {
             set_up_s: set_up.cpu_s,
             ..Found::exact(error, cost.less(set_up))
@@ -269,7 +262,8 @@ pub(super) fn signal(quick: bool) -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     for (case, pulse_s) in [("records, 200 ns", 200e-9), ("records, 400 ns", 400e-9)] {
         let knob = [case, "record of 300 samples", "layers for each sample"];
-        let (gate, long) = (simulator(pulse_s, GATE)?, simulator(pulse_s, SAMPLES)?);
+        let gate = simulator(pulse_s, GATE)?;
+        let long = simulator(pulse_s, SAMPLES)?;
         let exact = gate.covariance_a2(&line(&gate, GATE, 8)?)?;
         let largest = exact.iter().map(|value| value.norm()).fold(0.0, f64::max);
         rows.extend(settings(
@@ -284,7 +278,8 @@ pub(super) fn signal(quick: bool) -> Result<Vec<Row>, Failure> {
                     / largest;
                 let air = line(&long, SAMPLES, parts as usize)?;
                 let ((), cost) = fastest(|| {
-                    let (mut scratch, mut out_a) = (Scratch::default(), vec![0.0; SAMPLES]);
+                    let mut scratch = Scratch::default();
+                    let mut out_a = vec![0.0; SAMPLES];
                     for pulse in 0..records {
                         let mut rng = pulse_generator(SEED, PulseKey { line: 0, pulse });
                         long.record_into(&air, &mut rng, &mut scratch, &mut out_a)?;
@@ -304,16 +299,16 @@ const KERNEL_RUNS: usize = 20;
 /// Processor time of the lines of twenty transforms of 512 x 512 points \[s\]: by it times of another machine are scaled to this one.
 pub(super) fn kernel_s() -> Result<f64, Failure> {
     let fft = FftPlanner::<f64>::new().plan_fft_forward(512);
-    let (mut field, mut scratch) = (
-        vec![Complex::new(1.0, 0.0); 512 * 512],
-        vec![Complex::default(); 512],
-    );
+    let mut field = vec![Complex::new(1.0, 0.0); 512 * 512];
+    let mut scratch = vec![Complex::default(); 512];
     let both_ways = 2 * 20;
     let mut least_s = f64::INFINITY;
     for _ in 0..KERNEL_RUNS {
         let ((), cost) = fastest(|| {
             field.fill(Complex::new(1.0, 0.0));
-            (0..both_ways).for_each(|_| fft.process_with_scratch(&mut field, &mut scratch));
+            for _ in 0..both_ways {
+                fft.process_with_scratch(&mut field, &mut scratch);
+            }
             Ok(())
         })?;
         least_s = least_s.min(cost.cpu_s);
