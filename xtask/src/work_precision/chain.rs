@@ -27,62 +27,73 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
         ..Request::new(SEARCH.0, &[Figure::Std])
     };
     let found = Accuracy::of(&file, &request, &Silent)?;
-    let lacking = || Failure::new("the search tells no standard deviation of the map".into());
-    let of_one = 0.5
-        * found.noises.first().ok_or_else(lacking)?.now
-        * (file.content.scan.realisations as f64).sqrt();
-    let finest = found
-        .ladders
-        .iter()
-        .filter_map(|ladder| Some((ladder.key, ladder.steps.first()?.value)));
-    let fine = with(&file, &finest.collect::<Vec<_>>())?;
+    let noise = found.noises.first().ok_or_else(|| {
+        Failure::new("the search reports no standard deviation of the map".into())
+    })?;
+    let realisations = file.content.scan.realisations as f64;
+    let of_one = 0.5 * noise.now * realisations.sqrt();
+    let mut finest = Vec::new();
+    for ladder in &found.ladders {
+        if let Some(step) = ladder.steps.first() {
+            finest.push((ladder.key, step.value));
+        }
+    }
+    let fine = with(&file, &finest)?;
     let mut rows = Vec::new();
-    for step in found
+    for ladder in found
         .ladders
         .iter()
         .filter(|ladder| ladder.key == WINDOW_STEP)
-        .flat_map(|ladder| &ladder.steps)
     {
-        let method = match step.value {
-            1.0 => "windows at every sample".into(),
-            value => format!("windows {value} samples apart"),
-        };
-        let shift = match step.verdict {
-            Verdict::Finest => Some(Shift::default()),
-            // What is left of the gates tells nothing of the map.
-            Verdict::Lost(_) => None,
-            _ => step.shift(Figure::Std),
-        };
-        let counts = if shift.is_some() {
-            few(&COUNTS, quick)
-        } else {
-            &COUNTS[..1]
-        };
-        rows.extend(settings(
-            ["one whole map", &method, "realisations"],
-            counts,
-            |count| {
-                let plan = Plan::new(
-                    with(&fine, &[(WINDOW_STEP, step.value), (REALISATIONS, count)])?,
-                    Target::Map,
-                )?;
-                let (_, cost) = fastest(|| Ok(run::run(&plan, &Silent)?))?;
-                let Some(Shift {
-                    shift,
-                    error: of_shift,
-                }) = shift
-                else {
-                    return Ok(Found::exact(f64::NAN, cost));
-                };
-                let error = shift.hypot(of_one / count.sqrt());
-                Ok(Found {
-                    error,
-                    standard_error: (shift / error * of_shift).abs(),
-                    cost,
-                    set_up_s: 0.0,
-                })
-            },
-        )?);
+        for step in &ladder.steps {
+            let shift = match step.verdict {
+                Verdict::Finest => Some(Shift::default()),
+                // What is left of the gates tells nothing of the map.
+                Verdict::Lost(_) => None,
+                _ => step.shift(Figure::Std),
+            };
+            rows.extend(rows_of_step(&fine, step.value, shift, of_one, quick)?);
+        }
     }
     Ok(rows)
+}
+
+/// The map with windows some samples apart, by the number of realisations; errors are the shift of the step and the noise of the
+/// realisations, of which one has the noise `of_one`.
+fn rows_of_step(
+    fine: &SceneFile,
+    step: f64,
+    shift: Option<Shift>,
+    of_one: f64,
+    quick: bool,
+) -> Result<Vec<Row>, Failure> {
+    let method = if step == 1.0 {
+        "windows at every sample".into()
+    } else {
+        format!("windows {step} samples apart")
+    };
+    let counts = if shift.is_some() {
+        few(&COUNTS, quick)
+    } else {
+        &COUNTS[..1]
+    };
+    settings(
+        ["one whole map", &method, "realisations"],
+        counts,
+        |count| {
+            let scene = with(fine, &[(WINDOW_STEP, step), (REALISATIONS, count)])?;
+            let plan = Plan::new(scene, Target::Map)?;
+            let (_, cost) = fastest(|| Ok(run::run(&plan, &Silent)?))?;
+            let Some(shift) = shift else {
+                return Ok(Found::exact(f64::NAN, cost));
+            };
+            let error = shift.shift.hypot(of_one / count.sqrt());
+            Ok(Found {
+                error,
+                standard_error: (shift.shift / error * shift.error).abs(),
+                cost,
+                set_up_s: 0.0,
+            })
+        },
+    )
 }
