@@ -517,7 +517,7 @@ fn a_fit_opens_no_flow_and_a_scene_that_is_not_read_is_refused_with_its_key() {
     );
     fs::write(
         folder.join("unknown.csv"),
-        map.replace("#   [flow]\n", "#   [flow]\n#   colour = 3\n"),
+        map.replace("kind = \"vortex_pair\"", "kind = \"waves\""),
     )
     .unwrap();
     for command in ["retrieve", "detect"] {
@@ -525,7 +525,7 @@ fn a_fit_opens_no_flow_and_a_scene_that_is_not_read_is_refused_with_its_key() {
         let told = String::from_utf8_lossy(&out.stderr).into_owned();
         assert_eq!(out.status.code(), Some(2), "{told}");
         assert!(
-            told.contains("flow.colour") && told.contains("--scene"),
+            told.contains("flow.kind = \"waves\"") && told.contains("--scene"),
             "{told}"
         );
     }
