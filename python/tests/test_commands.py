@@ -67,9 +67,10 @@ def test_a_sweep_is_a_dataset_over_cases(tmp_path):
     assert (tmp_path / "sweep/results.nc").exists()
 
 
-def test_accuracy_gives_the_scene_that_it_found():
+def test_accuracy_has_shifts_and_run_times_of_each_setting():
     found = wakescope.accuracy(small(**{"scan.realisations": 4}), within=0.5, of=["std"])
-    assert found.attrs["is_reached"] in (0, 1) and "[scan]" in found.attrs["scene"] and "verdict" in found
+    assert found.attrs["is_reached"] in (0, 1) and "estimator.padded_samples" in found["setting"].values
+    assert float(found["run_s"].min()) > 0 and set(found["metric"].values) == {"std"}
 
 
 def test_a_flow_and_a_wake_tell_their_progress(tmp_path):

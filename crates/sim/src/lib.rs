@@ -34,7 +34,7 @@
 //! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
 //! | [`mod@run`] | running a plan |
 //! | [`mod@write`] | writing the results of a run |
-//! | [`accuracy`] | how accurate a scene's own numbers are, and the cheapest keys for an accuracy |
+//! | [`accuracy`] | numerical error and run time, setting by setting |
 //! | [`sweep`] | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`io`], [`plot`] | file formats, pictures |

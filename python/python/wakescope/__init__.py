@@ -143,11 +143,10 @@ def sweep(scene: Scene, vary: Mapping[str, Any] | Sequence[str] = (), **options:
 
 
 def accuracy(scene: Scene, within: float, **options: Any) -> xarray.Dataset:
-    """How far the figures of a scene, or of the case of a flow, shift with each key, and the cheapest keys for an error `within`; the
-    scene or case that has them is the attribute `scene` or `case`."""
+    """Numerical error and run time of a scene or of the case of a flow, setting by setting: shifts of each metric with their standard
+    errors, and the cheapest value whose error is `within` a relative error, such as 0.03."""
     result = _command("accuracy", scene, within=within, **options)
-    kind = "case" if "case_hash" in result.answer else "scene"
-    return attributes(result["accuracy"], {**result.answer, kind: result.read(f"{kind}_accuracy.toml").decode()})
+    return attributes(result["accuracy"], result.answer)
 
 
 def flow(case: Scene, out: Path_ | None = None, progress: Progress = None, **options: Any) -> Result:

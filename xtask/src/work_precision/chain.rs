@@ -1,14 +1,13 @@
 //! Error against run time of the whole chain: the standard deviation of a map by the realisations of the scan and by the step between
-//! windows, as `wakescope accuracy` tells its shift and its noise.
+//! windows, with the shift and the noise that `wakescope accuracy` reports.
 
 use super::{Found, Row, few, settings};
 use crate::cost::fastest;
 use fixtures::failure::Failure;
 use std::path::Path;
-use wakescope_sim::accuracy::figures::{Figure, Shift};
 use wakescope_sim::accuracy::keys::{REALISATIONS, WINDOW_STEP, with};
-use wakescope_sim::accuracy::ladder::Verdict;
-use wakescope_sim::accuracy::{Accuracy, Request};
+use wakescope_sim::accuracy::metrics::{Metric, Shift};
+use wakescope_sim::accuracy::{Report, Request, Setting};
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::run;
 use wakescope_sim::scene::SceneFile;
@@ -16,44 +15,27 @@ use wakescope_sim::setup::progress::Silent;
 
 /// Realisations of the scan.
 const COUNTS: [f64; 6] = [2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
-/// Target of the search, a relative error, and what it may take in runs of the scene: enough that every step is looked at.
-const SEARCH: (f64, f64) = (0.03, 100.0);
 
 /// All measurements; few realisations if `quick`.
 pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let file = SceneFile::parse(include_str!("chain.toml"), Path::new("chain.toml"))?;
     let request = Request {
-        budget: SEARCH.1,
-        ..Request::new(SEARCH.0, &[Figure::Std])
+        within: 0.03,
+        of: vec![Metric::Std],
     };
-    let found = Accuracy::of(&file, &request, &Silent)?;
-    let noise = found.noises.first().ok_or_else(|| {
-        Failure::new("the search reports no standard deviation of the map".into())
-    })?;
-    let realisations = file.content.scan.realisations as f64;
-    let of_one = 0.5 * noise.now * realisations.sqrt();
-    let mut finest = Vec::new();
-    for ladder in &found.ladders {
-        if let Some(step) = ladder.steps.first() {
-            finest.push((ladder.key, step.value));
-        }
-    }
-    let fine = with(&file, &finest)?;
+    let report = Report::of_scene(&file, &request, &Silent)?;
+    let given = setting(&report, REALISATIONS)?
+        .given_row()
+        .ok_or_else(|| lacking(REALISATIONS))?;
+    let noise = given
+        .shift(Metric::Std)
+        .ok_or_else(|| lacking(REALISATIONS))?;
+    let of_one = noise.standard_error * given.value.sqrt();
     let mut rows = Vec::new();
-    for ladder in found
-        .ladders
-        .iter()
-        .filter(|ladder| ladder.key == WINDOW_STEP)
-    {
-        for step in &ladder.steps {
-            let shift = match step.verdict {
-                Verdict::Finest => Some(Shift::default()),
-                // What is left of the gates tells nothing of the map.
-                Verdict::Lost(_) => None,
-                _ => step.shift(Figure::Std),
-            };
-            rows.extend(rows_of_step(&fine, step.value, shift, of_one, quick)?);
-        }
+    for row in &setting(&report, WINDOW_STEP)?.rows {
+        // The gates that are left say nothing of the map.
+        let shift = row.shift(Metric::Std).filter(|_| row.is_usable());
+        rows.extend(rows_of_step(&file, row.value, shift, of_one, quick)?);
     }
     Ok(rows)
 }
@@ -61,7 +43,7 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
 /// The map with windows some samples apart, by the number of realisations; errors are the shift of the step and the noise of the
 /// realisations, of which one has the noise `of_one`.
 fn rows_of_step(
-    fine: &SceneFile,
+    file: &SceneFile,
     step: f64,
     shift: Option<Shift>,
     of_one: f64,
@@ -77,12 +59,12 @@ fn rows_of_step(
     } else {
         &COUNTS[..1]
     };
+    let spaced = with(file, WINDOW_STEP, step)?;
     settings(
         ["one whole map", &method, "realisations"],
         counts,
         |count| {
-            let scene = with(fine, &[(WINDOW_STEP, step), (REALISATIONS, count)])?;
-            let plan = Plan::new(scene, Target::Map)?;
+            let plan = Plan::new(with(&spaced, REALISATIONS, count)?, Target::Map)?;
             let (_, cost) = fastest(|| Ok(run::run(&plan, &Silent)?))?;
             let Some(shift) = shift else {
                 return Ok(Found::exact(f64::NAN, cost));
@@ -90,10 +72,21 @@ fn rows_of_step(
             let error = shift.shift.hypot(of_one / count.sqrt());
             Ok(Found {
                 error,
-                standard_error: (shift.shift / error * shift.error).abs(),
+                standard_error: (shift.shift / error * shift.standard_error).abs(),
                 cost,
                 set_up_s: 0.0,
             })
         },
     )
+}
+
+fn setting<'r>(report: &'r Report, key: &'static str) -> Result<&'r Setting, Failure> {
+    let mut settings = report.settings.iter();
+    settings
+        .find(|setting| setting.key == key)
+        .ok_or_else(|| lacking(key))
+}
+
+fn lacking(key: &str) -> Failure {
+    Failure::new(format!("the report has no standard deviation for {key}"))
 }

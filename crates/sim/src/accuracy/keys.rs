@@ -1,6 +1,4 @@
-//! Keys that trade error for time, by their paths, and scenes with other values of them.
-//!
-//! Check: the search, which makes scenes of them.
+//! Settings that trade accuracy for time, by the paths of their keys, and scenes with other values of them.
 
 use crate::Error;
 use crate::keys::{from_table, to_table, value_at};
@@ -16,7 +14,7 @@ pub const PADDED: &str = "estimator.padded_samples";
 pub const LAYERS: &str = "atmosphere.turbulence.layers";
 /// Points along a side of the screens.
 pub const GRID_POINTS: &str = "atmosphere.turbulence.grid_points";
-/// Distance between points of the screens; here their width stays.
+/// Distance between points of the screens; their width is retained.
 pub const GRID_SPACING: &str = "atmosphere.turbulence.grid_spacing_m";
 /// Realisations of the path.
 pub const PATHS: &str = "atmosphere.turbulence.realisations";
@@ -35,32 +33,24 @@ pub(super) fn value(scene: &Scene, key: &str) -> f64 {
     }
 }
 
-/// A scene with other values of some keys, one after the other; another spacing of the screens comes with as many points as keep their width.
+/// A scene with another value of a key; another spacing of the screens comes with as many points as retain their width.
 ///
 /// # Errors
 /// What the scene does not allow.
-pub fn with(file: &SceneFile, values: &[(&'static str, f64)]) -> Result<SceneFile, Error> {
-    let mut scene = file.content.clone();
-    for &(key, number) in values {
-        let whole = |number: f64| Value::Integer(number.round() as i64);
-        let mut table = to_table(&scene);
-        if key == GRID_SPACING {
-            let width_m = value(&scene, GRID_POINTS) * value(&scene, GRID_SPACING);
-            set(&mut table, GRID_POINTS, whole(width_m / number));
-        }
-        set(
-            &mut table,
-            key,
-            if key == GRID_SPACING {
-                Value::Float(number)
-            } else {
-                whole(number)
-            },
-        );
-        scene = from_table(table).ok_or_else(|| Error::Key {
-            key,
-            reason: format!("a value other than {number}"),
-        })?;
+pub fn with(file: &SceneFile, key: &'static str, number: f64) -> Result<SceneFile, Error> {
+    let scene = &file.content;
+    let mut table = to_table(scene);
+    let whole = |number: f64| Value::Integer(number.round() as i64);
+    if key == GRID_SPACING {
+        let width_m = value(scene, GRID_POINTS) * value(scene, GRID_SPACING);
+        set(&mut table, GRID_POINTS, whole(width_m / number));
+        set(&mut table, key, Value::Float(number));
+    } else {
+        set(&mut table, key, whole(number));
     }
-    Ok(file.with(scene)?)
+    let changed = from_table(table).ok_or_else(|| Error::Key {
+        key,
+        reason: format!("a value other than {number}"),
+    })?;
+    Ok(file.with(changed)?)
 }

@@ -1,256 +1,334 @@
-//! How accurate the numbers of a scene or of a flow are, and the cheapest keys for an accuracy that is asked for.
+//! Numerical error and run time of a scene or flow, setting by setting.
 //!
-//! | module | what is in it |
+//! Each setting that trades accuracy for time is varied alone. The error of a value is its shift from the finest value of the setting,
+//! or from theory where that is known.
+//!
+//! | module | contents |
 //! |---|---|
-//! | [`figures`] | the figures that a run writes, and their shifts between settings |
-//! | [`keys`] | keys that trade error for time |
-//! | [`ladder`] | values of a key from fine to coarse, verdicts, the choice |
-//! | `search` | the search: what it plans, measures and spends; keys of the estimator, measured on maps |
-//! | `screens` | keys of phase screens |
-//! | `verify` | the choice as a whole; realisations |
-//! | `flows` | meshes and steps of the case of a flow; the order of errors |
-//! | `report`, `pictures` | the answer as text, table and scene; drawn |
+//! | [`metrics`] | the metrics whose error is assessed, and their shifts between two runs |
+//! | [`keys`] | the settings, and scenes with other values of them |
+//! | `scene` | runs of a scene: estimator, phase screens, realisations |
+//! | `flow` | runs of a flow: cells and time steps, with Richardson's extrapolation |
+//! | `text`, `picture` | the report as text and table; drawn |
 
-pub mod figures;
-mod flows;
+mod flow;
 pub mod keys;
-pub mod ladder;
+pub mod metrics;
 #[cfg(feature = "plots")]
-mod pictures;
-mod report;
-mod screens;
-mod search;
-mod verify;
+mod picture;
+mod scene;
+mod text;
 
 use crate::Error;
 use crate::io::Provenance;
-use crate::plan::Plan;
-use crate::scene::{Pattern, SceneFile};
-use crate::setup::efficiency_model::{drawn_turbulence, model};
-use figures::{Figure, Shift};
-use ladder::Ladder;
-use wakescope_optics::plan::Model;
+use crate::sweep::front::front;
+use metrics::{Metric, Shift};
 
-/// What is asked for.
+/// What is requested of a report.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct Request {
-    /// Largest relative error of each figure, two standard errors included, such as 3%.
-    #[cfg_attr(feature = "cli", arg(long, value_name = "PART", value_parser = part))]
+    /// Largest relative error of each metric, such as 3%.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "ERROR", value_parser = relative_error))]
     pub within: f64,
-    /// Figures to be judged; all that a run of the scene writes without it, circulation where the scene has a retrieval.
+    /// Metrics to assess; by default all that the scene has.
     #[cfg_attr(
         feature = "cli",
-        arg(long, value_name = "FIGURE,...", value_delimiter = ',', value_enum)
+        arg(long, value_name = "METRIC,...", value_delimiter = ',', value_enum)
     )]
-    pub of: Vec<Figure>,
-    /// What the search may take, and a run that it proposes: so many times the scene's own run.
-    #[cfg_attr(feature = "cli", arg(long, value_name = "RUNS", default_value = "10", value_parser = budget))]
-    pub budget: f64,
+    pub of: Vec<Metric>,
 }
 
 impl Request {
-    /// Of these figures, all where there are none, within a budget of ten runs.
-    #[must_use]
-    pub fn new(within: f64, of: &[Figure]) -> Self {
-        Self {
-            within,
-            of: of.to_vec(),
-            budget: 10.0,
-        }
-    }
-
-    /// The figures that are judged, in the order of tables.
+    /// The metrics to assess among those that a `subject` has.
     ///
     /// # Errors
-    /// One that the scene does not have.
-    fn figures(&self, own: &Plan) -> Result<Vec<Figure>, Error> {
-        let scene = &own.scene.content;
-        let tells_winds = matches!(
-            scene.scan.pattern,
-            Pattern::Vad { .. } | Pattern::Dbs { .. }
-        );
-        let lacking = |figure: Figure| match figure {
-            Figure::U | Figure::V | Figure::W if !tells_winds => {
-                Some("is a wind of scan.pattern.kind = \"vad\" or \"dbs\" alone")
-            }
-            Figure::Height | Figure::Energy | Figure::Dissipation => {
-                Some("is a figure of the case of a flow, and this is a scene")
-            }
-            Figure::Efficiency if drawn_turbulence(scene).is_some() => Some(
-                "is one for each pulse with atmosphere.turbulence.efficiency = \"realisation\"; it has a mean to judge with \"mean\"",
-            ),
-            _ => None,
+    /// A metric that is requested and that the subject does not have; no metric at all.
+    fn select(&self, subject: &str, available: &[Metric]) -> Result<Vec<Metric>, Error> {
+        let names: Vec<&str> = available.iter().map(|metric| metric.name()).collect();
+        let refuse = |reason: String| Error::Input {
+            path: "--of".into(),
+            reason,
         };
-        if let Some((figure, why)) = self
-            .of
-            .iter()
-            .find_map(|figure| Some((figure, lacking(*figure)?)))
-        {
-            return Err(Error::Input {
-                path: "--of".into(),
-                reason: format!("{} {why}", figure.name()),
-            });
+        if let Some(metric) = self.of.iter().find(|metric| !available.contains(metric)) {
+            let name = metric.name();
+            let known = names.join(", ");
+            return Err(refuse(format!(
+                "{name} is no metric of this {subject}, which has: {known}"
+            )));
         }
-        let has = |figure: &Figure| match figure {
-            Figure::Efficiency => model(scene) == Model::MonteCarlo,
-            Figure::Circulation => scene.retrieval.is_some() || !self.of.is_empty(),
-            _ => true,
-        };
-        let is_asked = |figure: &Figure| self.of.is_empty() || self.of.contains(figure);
-        let is_judged =
-            |figure: &Figure| lacking(*figure).is_none() && has(figure) && is_asked(figure);
-        Ok(Figure::ALL.into_iter().filter(is_judged).collect())
+        if available.is_empty() {
+            return Err(refuse(format!("this {subject} has no metric")));
+        }
+        let is_requested = |metric: &Metric| self.of.is_empty() || self.of.contains(metric);
+        Ok(available.iter().copied().filter(is_requested).collect())
     }
 }
 
 /// A relative error, such as 3% or 0.03.
 #[cfg(feature = "cli")]
-fn part(text: &str) -> Result<f64, String> {
+fn relative_error(text: &str) -> Result<f64, String> {
     let number = match text.trim().strip_suffix('%') {
         Some(percent) => percent.trim().parse::<f64>().map(|percent| 0.01 * percent),
         None => text.trim().parse(),
     };
-    let allowed = "from 0.001% to 50%, such as 3% or 0.03";
     number
         .ok()
-        .filter(|part| (1e-5..=0.5).contains(part))
-        .ok_or_else(|| allowed.into())
+        .filter(|error| (1e-5..=0.5).contains(error))
+        .ok_or_else(|| "from 0.001% to 50%, such as 3% or 0.03".into())
 }
 
-#[cfg(feature = "cli")]
-fn budget(text: &str) -> Result<f64, String> {
-    let number = text
-        .trim()
-        .parse::<f64>()
-        .ok()
-        .filter(|runs| (1.0..=1e6).contains(runs));
-    number.ok_or_else(|| "from 1 to 1000000 runs of the scene".into())
-}
-
-/// What the noise of a figure asks for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
-    /// The figure.
-    pub figure: Figure,
-    /// The key of the realisations that average it.
-    pub key: &'static str,
-    /// Two standard errors over the value with the scene's own realisations.
-    pub now: f64,
-    /// Realisations that leave the target beside the keys.
-    pub needed: f64,
-    /// Forecast of a run with them, s of one core.
-    pub forecast_s: f64,
-    /// Error that a run for the whole budget has.
-    pub of_budget: f64,
-    /// Whether such a run is within the budget.
-    pub is_reached: bool,
-}
-
-/// A figure with its predicted shift and the one that was found.
-pub type Found = (Figure, f64, Shift);
-
-/// The choice as a whole with another seed.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Verified {
-    /// The seed.
-    pub seed: u64,
-    /// Predicted and found shift of each figure; none where nothing is coarser than the finest setting.
-    pub rows: Vec<Found>,
-    /// Whether all are within the target, two standard errors included.
-    pub is_confirmed: bool,
-}
-
-/// What an answer is about: a scene, or the case of a flow.
-pub trait Subject {
-    /// In a word.
-    const NAME: &'static str;
-    /// Whether its figures are of random signals.
-    const IS_NOISY: bool;
-
-    /// What its files say of where they come from: all of its keys as TOML, its seed.
-    fn provenance(&self) -> Provenance;
-}
-
-impl Subject for SceneFile {
-    const NAME: &'static str = "scene";
-    const IS_NOISY: bool = true;
-
-    fn provenance(&self) -> Provenance {
-        Self::provenance(self)
-    }
-}
-
-/// The answer.
+/// Errors and run time of a scene or flow for each value of each setting.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Accuracy<S = SceneFile> {
-    /// Hash of the scene or case.
-    pub of_scene: String,
-    /// Target, a relative error.
+pub struct Report {
+    /// What is assessed: `scene` or `case`.
+    pub subject: &'static str,
+    /// The scene or case.
+    pub provenance: Provenance,
+    /// Largest relative error of a recommended value, two standard errors included.
     pub within: f64,
-    /// Forecast of its own run without pictures, s of one core.
-    pub own_s: f64,
-    /// Forecast of what the search did, s of one core.
-    pub spent_s: f64,
-    /// What it took, s.
-    pub took_s: f64,
-    /// The budget, s of one core.
-    pub allowed_s: f64,
-    /// Realisations of the pilot.
-    pub pilot: usize,
-    /// The figures that are judged.
-    pub figures: Vec<Figure>,
-    /// All keys with their values.
-    pub ladders: Vec<Ladder>,
-    /// Shift of figures of the map for that of the efficiency.
-    pub response: Vec<(Figure, f64)>,
-    /// What noise asks for.
-    pub noises: Vec<Noise>,
-    /// The choice as a whole.
-    pub verified: Verified,
-    /// What was not done, and why.
+    /// Realisations of the scan in each run; none of a flow, which has no noise.
+    pub realisations: Option<usize>,
+    /// Metrics that are assessed.
+    pub metrics: Vec<Metric>,
+    /// The settings, each varied alone.
+    pub settings: Vec<Setting>,
+    /// What limits the report.
     pub notes: Vec<String>,
-    /// The scene or case with the keys that are chosen.
-    pub scene: S,
-    /// Forecast of its run without pictures, s of one core.
+}
+
+/// A setting with its values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// Path of its key.
+    pub key: &'static str,
+    /// Its value in the scene or case.
+    pub given: f64,
+    /// Its values from the finest to the coarsest.
+    pub rows: Vec<Row>,
+}
+
+/// A value of a setting.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The value; of cells their number.
+    pub value: f64,
+    /// The value as it is printed.
+    pub label: String,
+    /// Relative shift of each metric that the setting acts on.
+    pub shifts: Vec<(Metric, Shift)>,
+    /// Fraction of the gates that have no estimate with this value and have one with the finest.
+    pub lost: f64,
+    /// Why the program refuses the value.
+    pub refused: Option<String>,
+    /// Wall time of the run, s; NaN where it was refused.
     pub run_s: f64,
 }
 
-impl<S: Subject> Accuracy<S> {
-    /// That of a scene or case, and its hash, before anything is looked at; forecasts of its own run and of what was done, s of one core.
-    fn begun(
-        (scene, hash): (S, &str),
-        request: &Request,
-        [own_s, spent_s]: [f64; 2],
-        figures: Vec<Figure>,
-    ) -> Self {
+impl Setting {
+    /// The row with the value of the scene or case.
+    #[must_use]
+    pub fn given_row(&self) -> Option<&Row> {
+        self.rows.iter().find(|row| row.value == self.given)
+    }
+
+    /// The row of least run time whose metrics are all within a relative error.
+    #[must_use]
+    pub fn cheapest(&self, within: f64) -> Option<&Row> {
+        self.rows
+            .iter()
+            .filter(|row| row.is_within(within))
+            .min_by(|a, b| a.run_s.total_cmp(&b.run_s))
+    }
+}
+
+impl Row {
+    /// A value that was run.
+    fn new(value: f64, label: String, run_s: f64) -> Self {
         Self {
-            of_scene: hash.into(),
-            within: request.within,
-            own_s,
-            spent_s,
-            took_s: 0.0,
-            allowed_s: request.budget * own_s,
-            pilot: 0,
-            figures,
-            ladders: Vec::new(),
-            response: Vec::new(),
-            noises: Vec::new(),
-            verified: Verified::default(),
-            notes: Vec::new(),
-            scene,
-            run_s: own_s,
+            value,
+            label,
+            shifts: Vec::new(),
+            lost: 0.0,
+            refused: None,
+            run_s,
         }
     }
 
-    /// Whether a run within the budget has every figure within the target.
+    /// A value that the program refuses.
+    fn refused(value: f64, label: String, error: &Error) -> Self {
+        let reason = error.to_string();
+        // The first line without the position of a value that the user did not write.
+        let first = reason.lines().next().unwrap_or_default();
+        let allowed = first.split("is not allowed: ").last().unwrap_or_default();
+        let short = allowed.split("; together").next().unwrap_or_default();
+        Self {
+            refused: Some(short.into()),
+            ..Self::new(value, label, f64::NAN)
+        }
+    }
+
+    /// Shift of a metric, where the setting acts on it and the value was run.
+    #[must_use]
+    pub fn shift(&self, metric: Metric) -> Option<Shift> {
+        self.shifts
+            .iter()
+            .find(|(own, _)| *own == metric)
+            .map(|(_, shift)| *shift)
+    }
+
+    /// Whether the value can be used: it is accepted and every gate keeps its estimate.
+    #[must_use]
+    pub fn is_usable(&self) -> bool {
+        self.refused.is_none() && self.lost == 0.0
+    }
+
+    /// Whether the value can be used and all metrics are within a relative error.
+    #[must_use]
+    pub fn is_within(&self, within: f64) -> bool {
+        let mut shifts = self.shifts.iter();
+        self.is_usable() && shifts.all(|(_, shift)| shift.bound() <= within)
+    }
+}
+
+impl Report {
+    /// Whether every setting has a value within the relative error.
     #[must_use]
     pub fn is_reached(&self) -> bool {
-        let reached = |figure: &Figure| {
-            self.noises
-                .iter()
-                .any(|noise| noise.figure == *figure && noise.is_reached)
+        self.settings
+            .iter()
+            .all(|setting| setting.cheapest(self.within).is_some())
+    }
+
+    /// The setting and the row of least run time within the relative error.
+    #[must_use]
+    pub fn cheapest(&self) -> Option<(&Setting, &Row)> {
+        self.settings
+            .iter()
+            .filter_map(|setting| Some((setting, setting.cheapest(self.within)?)))
+            .min_by(|(_, a), (_, b)| a.run_s.total_cmp(&b.run_s))
+    }
+
+    /// All rows with their settings.
+    fn rows(&self) -> impl Iterator<Item = (&Setting, &Row)> {
+        self.settings
+            .iter()
+            .flat_map(|setting| setting.rows.iter().map(move |row| (setting, row)))
+    }
+
+    /// Whether each of [`Self::rows`] is on the front of error against run time of a metric: no other row that can be used is as good
+    /// in one and better in the other.
+    fn front(&self, metric: Metric) -> Vec<bool> {
+        let mut run_s = Vec::new();
+        let mut errors = Vec::new();
+        for (_, row) in self.rows() {
+            let shift = row.shift(metric).filter(|_| row.is_usable());
+            run_s.push(row.run_s);
+            errors.push(shift.map_or(f64::NAN, Shift::bound));
+        }
+        front(&[run_s, errors])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(value: f64, run_s: f64, shift: f64, standard_error: f64) -> Row {
+        let shift = Shift {
+            shift,
+            standard_error,
         };
-        self.verified.is_confirmed && (!S::IS_NOISY || self.figures.iter().all(reached))
+        Row {
+            shifts: vec![(Metric::Rms, shift)],
+            ..Row::new(value, format!("{value}"), run_s)
+        }
+    }
+
+    fn report(settings: Vec<Setting>) -> Report {
+        Report {
+            subject: "scene",
+            provenance: Provenance::new("", "0", 1),
+            within: 0.03,
+            realisations: Some(8),
+            metrics: vec![Metric::Rms],
+            settings,
+            notes: Vec::new(),
+        }
+    }
+
+    fn window_step() -> Setting {
+        let mut lossy = row(8.0, 1.0, 0.0, 0.0);
+        lossy.lost = 0.13;
+        let error = Error::Key {
+            key: keys::WINDOW_STEP,
+            reason: "16 is not allowed: at most 9; together with others".into(),
+        };
+        Setting {
+            key: keys::WINDOW_STEP,
+            given: 2.0,
+            rows: vec![
+                row(1.0, 9.0, 0.0, 0.0),
+                row(2.0, 6.0, 0.01, 0.005),
+                row(4.0, 4.0, -0.02, 0.01),
+                lossy,
+                Row::refused(16.0, "16".into(), &error),
+            ],
+        }
+    }
+
+    #[test]
+    fn the_recommended_row_is_the_cheapest_within_the_error_and_loses_no_gate() {
+        let setting = window_step();
+        let value = |within: f64| setting.cheapest(within).map(|row| row.value);
+        assert_eq!(value(0.5), Some(4.0), "8 loses gates, 16 is refused");
+        assert_eq!(value(0.03), Some(2.0), "two standard errors count");
+        assert_eq!(value(1e-4), Some(1.0));
+        let unknown = Setting {
+            rows: vec![row(1.0, 1.0, f64::NAN, 0.0)],
+            ..setting.clone()
+        };
+        assert_eq!(unknown.cheapest(0.5), None);
+        let report = report(vec![setting, unknown]);
+        let (setting, row) = report.cheapest().unwrap();
+        assert_eq!((setting.key, row.value), (keys::WINDOW_STEP, 2.0));
+        assert!(!report.is_reached());
+    }
+
+    #[test]
+    fn lost_gates_refusals_and_settings_without_a_value_are_in_text_and_table() {
+        let noise = Setting {
+            key: keys::REALISATIONS,
+            given: 8.0,
+            rows: vec![row(8.0, 7.0, 0.0, 0.04)],
+        };
+        let report = report(vec![window_step(), noise]);
+        let text = report.text();
+        for expected in [
+            "loses 13.0 % of the gates",
+            "estimator.window_step_samples = 16 is refused: at most 9",
+            "scan.realisations: no value is within 3.00 %",
+            "cheapest within 3.00 %: estimator.window_step_samples = 2, 6.0 s (as given 6.0 s)",
+        ] {
+            assert!(text.contains(expected), "{expected}\n{text}");
+        }
+        let csv = report.table().to_csv(&report.provenance).unwrap();
+        let lines: Vec<&str> = csv.lines().filter(|line| !line.starts_with('#')).collect();
+        assert_eq!(lines.len(), 7, "{csv}");
+        assert!(
+            lines[4].ends_with("loses 13.0 % of the gates,1.0,0,0"),
+            "{csv}"
+        );
+    }
+
+    #[test]
+    fn the_front_has_the_rows_that_no_usable_row_beats() {
+        let slow = Setting {
+            key: keys::PADDED,
+            given: 64.0,
+            rows: vec![row(64.0, 7.0, 0.02, 0.005)],
+        };
+        let found = report(vec![window_step(), slow]).front(Metric::Rms);
+        assert_eq!(found, [true, true, true, false, false, false]);
     }
 }

@@ -1,22 +1,22 @@
-//! `wakescope accuracy`: how accurate the numbers of a scene or of a flow are, and the cheapest keys for an accuracy.
+//! `wakescope accuracy`: numerical error and run time of a scene or flow, setting by setting.
 
 use super::Cli;
 use super::flow::case_file;
 use super::words::FolderWords;
 use crate::Error;
-use crate::accuracy::{Accuracy, Request, Subject};
+use crate::accuracy::{Report, Request};
 use crate::flow::WakePreset;
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Words of `wakescope accuracy`.
+/// Arguments of `wakescope accuracy`.
 #[derive(Debug, Args)]
-pub(super) struct AccuracyWords {
-    /// The scene, or the case of a flow or wake: its keys tell which.
+pub(super) struct AccuracyArgs {
+    /// Scene file, or case file of a flow or wake.
     #[arg(required_unless_present = "preset")]
     scene: Option<PathBuf>,
-    /// A ready-made wake; a case file has keys of its own over it.
+    /// Wake preset; a case file overrides its keys.
     #[arg(long, value_enum)]
     preset: Option<WakePreset>,
     #[command(flatten)]
@@ -25,46 +25,44 @@ pub(super) struct AccuracyWords {
     folder: FolderWords,
 }
 
-/// Returns the exit code: 1 where the accuracy is out of reach.
-pub(super) fn accuracy(words: &AccuracyWords, cli: &Cli) -> Result<u8, Error> {
-    let (path, request) = (words.scene.as_deref(), &words.request);
-    if let Some(path) = path.filter(|path| words.preset.is_none() && !cli.is_case(path)) {
-        let file = cli.scene(path)?;
-        return answer(words, cli, || {
-            Accuracy::of(&file, request, &*cli.observer())
-        });
-    }
-    let file = case_file(path, words.preset, cli)?;
-    let file = cli
-        .seed
-        .map_or(Ok(file.clone()), |seed| file.with_seed(seed))?;
-    answer(words, cli, || {
-        Accuracy::of_case(&file, request, &*cli.observer())
-    })
-}
-
-fn answer<S: Subject>(
-    words: &AccuracyWords,
-    cli: &Cli,
-    find: impl FnOnce() -> Result<Accuracy<S>, Error>,
-) -> Result<u8, Error> {
-    words
-        .folder
-        .prepare(cli, |files| Accuracy::<S>::list(None, files))?;
-    let found = find()?;
-    let text = format!("{}search took {:.1} s\n", found.text(), found.took_s);
+/// Returns the exit code: 1 where a setting has no value within the error.
+pub(super) fn accuracy(args: &AccuracyArgs, cli: &Cli) -> Result<u8, Error> {
+    let prepare = || args.folder.prepare(cli, |files| Report::list(None, files));
+    let path = args.scene.as_deref();
+    let scene = path.filter(|path| args.preset.is_none() && !cli.is_case(path));
+    let report = match scene {
+        Some(path) => {
+            let file = cli.scene(path)?;
+            prepare()?;
+            Report::of_scene(&file, &args.request, &*cli.observer())?
+        }
+        None => {
+            let mut file = case_file(path, args.preset, cli)?;
+            if let Some(seed) = cli.seed {
+                file = file.with_seed(seed)?;
+            }
+            prepare()?;
+            Report::of_case(&file, &args.request, &*cli.observer())?
+        }
+    };
+    let cheapest = report.cheapest();
+    let cheapest_setting = cheapest.map(|(setting, _)| setting.key);
+    let cheapest_value = cheapest.map(|(_, row)| row.value);
     let mut object = json!({
-        "is_reached": found.is_reached(), "took_s": found.took_s,
-        "is_confirmed": found.verified.is_confirmed, "own_s": found.own_s, "search_s": found.spent_s, "run_s": found.run_s,
-        "rows": found.table().objects(), "notes": found.notes,
+        "within": report.within,
+        "is_reached": report.is_reached(),
+        "cheapest_setting": cheapest_setting,
+        "cheapest_value": cheapest_value,
+        "realisations": report.realisations,
+        "rows": report.table().objects(),
+        "notes": report.notes,
     });
-    object[format!("{}_hash", S::NAME)] = json!(found.of_scene);
-    let of = (Default::default(), found.scene.provenance());
-    words.folder.finish(
+    object[format!("{}_hash", report.subject)] = json!(report.provenance.scene_hash);
+    args.folder.finish(
         cli,
-        of,
-        |files| Accuracy::list(Some(&found), files),
-        (object, text),
+        (Default::default(), report.provenance.clone()),
+        |files| Report::list(Some(&report), files),
+        (object, report.text()),
     )?;
-    Ok(u8::from(!found.is_reached()))
+    Ok(u8::from(!report.is_reached()))
 }

@@ -38,7 +38,7 @@ pub struct Host {
 /// What a command gives to the program that runs it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Answer {
-    /// The exit code: 1 where an accuracy that was asked for is out of reach.
+    /// The exit code: 1 where no value of a setting has the requested accuracy.
     pub code: u8,
     /// The object that `--json` prints; null for a command that prints a text alone.
     pub object: Value,

@@ -1,6 +1,6 @@
 //! The command line program `wakescope`: words in, files and exit codes out.
 //!
-//! Exit codes: 0 done, 1 an accuracy that was asked for is out of reach, 2 wrong input or unusable output. Progress, plans and errors go to standard error,
+//! Exit codes: 0 done, 1 no value of a setting has the requested accuracy, 2 wrong input or unusable output. Progress, plans and errors go to standard error,
 //! results to standard output; `--json` makes the result one JSON object, and so an error.
 
 mod accuracy;
@@ -94,8 +94,8 @@ enum Command {
     Detect(detect::DetectWords),
     /// Run many scenes that differ in some keys: a table and pictures of what each gives.
     Sweep(sweep::SweepWords),
-    /// How accurate the numbers of a scene or of a flow are, and the cheapest keys for an accuracy that is asked for.
-    Accuracy(accuracy::AccuracyWords),
+    /// Numerical error and run time of a scene or flow, setting by setting.
+    Accuracy(accuracy::AccuracyArgs),
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
     Flow(flow::FlowWords),
     /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
@@ -152,7 +152,7 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
 
 fn dispatch(cli: &Cli) -> Result<u8, Error> {
     match &cli.command {
-        Command::Accuracy(words) => return accuracy::accuracy(words, cli),
+        Command::Accuracy(args) => return accuracy::accuracy(args, cli),
         Command::Init {
             scene,
             force,

@@ -129,7 +129,11 @@ impl CaseFile {
         let mut case = self.content.clone();
         let CaseKind::Wake(wake) = &mut case.case else {
             let allowed = "absent: this flow has no noise; it is for case.kind = \"wake\"";
-            return Err(self.refuse_word("--seed", &seed.to_string(), allowed.into()));
+            return Err(self.refused(vec![Problem {
+                key: "--seed".into(),
+                value: seed.to_string(),
+                allowed: allowed.into(),
+            }]));
         };
         wake.seed = Some(seed);
         Ok(self.changed(case))

@@ -3,10 +3,8 @@
 //! Check: the tests of `accuracy`, which compares them with a closed form.
 
 use super::execute::prepare;
-use super::free::InitialName;
-use super::{CaseFile, CaseKind, FlowForecast, RunOptions};
+use super::{CaseFile, CaseKind, RunOptions};
 use crate::Error;
-use crate::keys::SceneError;
 use crate::setup::progress::Observer;
 use std::path::Path;
 use std::sync::Arc;
@@ -23,39 +21,21 @@ pub(crate) type History = [Vec<f64>; 4];
 const TIMES: f64 = 16.0;
 
 impl CaseFile {
-    /// What a run would take, and all that is refused of it.
-    ///
-    /// # Errors
-    /// As [`super::check_on`].
-    pub(crate) fn forecast(&self) -> Result<FlowForecast, Error> {
-        Ok(prepare(self, Path::new(""), RunOptions::default(), &alone())?.3)
-    }
-
-    /// The same case with cells `ratio` times as long, at most so where they are shorter: even numbers, but for directions in which
-    /// nothing varies.
+    /// The same case with cells `ratio` times as long, rounded to even numbers but for directions in which nothing varies.
     pub(crate) fn coarser(&self, ratio: f64) -> Self {
         let mut case = self.content.clone();
-        for cells in case
-            .case
-            .cells_mut()
-            .into_iter()
-            .filter(|cells| **cells > 1)
-        {
-            let pairs = 0.5 * *cells as f64 / ratio;
-            *cells = 2
-                * (if ratio < 1.0 {
-                    pairs.ceil()
-                } else {
-                    pairs.round()
-                }) as usize;
+        for cells in case.case.cells_mut() {
+            if *cells > 1 {
+                *cells = 2 * (0.5 * *cells as f64 / ratio).round() as usize;
+            }
         }
         self.changed(case)
     }
 
-    /// The same case and time scheme with steps so many times as long; the key of the step, and its value.
+    /// The same case and time scheme with steps `times` as long; the key of the step, and its value.
     ///
     /// # Errors
-    /// As [`CaseFile::forecast`].
+    /// As [`super::check_on`].
     pub(crate) fn with_longer_steps(&self, times: f64) -> Result<(Self, &'static str, f64), Error> {
         let settings = prepare(self, Path::new(""), RunOptions::default(), &alone())?
             .0
@@ -73,7 +53,7 @@ impl CaseFile {
         Ok((self.changed(case), key, value))
     }
 
-    /// The same case for a history, at so many times that it can be compared; the case's own file is written nowhere near it.
+    /// The same case for a history, with enough output times to compare it; nothing is written.
     fn for_history(&self, end_s: f64) -> Self {
         let mut case = self.content.clone();
         (case.output.fields, case.output.planes) = Default::default();
@@ -90,24 +70,6 @@ impl CaseFile {
         self.changed(case)
     }
 
-    /// The same case for another folder: files that it names are found from everywhere.
-    ///
-    /// # Errors
-    /// What the system says of its folder.
-    pub(crate) fn portable(&self) -> Result<Self, Error> {
-        let mut case = self.content.clone();
-        if let CaseKind::Free(free) = &mut case.case
-            && let InitialName::Netcdf { path } = &mut free.initial
-        {
-            let whole = self.folder().join(&*path);
-            *path = std::path::absolute(&whole)
-                .map_err(Error::io("find", &whole))?
-                .to_string_lossy()
-                .into_owned();
-        }
-        Ok(self.changed(case))
-    }
-
     /// A refusal of its cells.
     pub(crate) fn refuse_cells(&self, allowed: String) -> Error {
         let is_free = matches!(self.content.case, CaseKind::Free(_));
@@ -117,27 +79,20 @@ impl CaseFile {
             allowed,
         )
     }
-
-    /// A refusal of a word of the command line.
-    pub(crate) fn refuse_word(&self, key: &str, value: &str, allowed: String) -> SceneError {
-        self.refused(vec![crate::keys::Problem {
-            key: key.into(),
-            value: value.into(),
-            allowed,
-        }])
-    }
 }
 
 fn alone() -> Arc<dyn Ranks> {
     Arc::new(Single)
 }
 
-/// Runs a case to its end and keeps its history; nothing is written.
+/// Runs a case to its end and returns its history; nothing is written.
 ///
 /// # Errors
 /// What the case refuses; a flow that blows up.
-pub(crate) fn of_history(file: &CaseFile, observer: &dyn Observer) -> Result<History, Error> {
-    let end_s = file.forecast()?.end_s;
+pub(crate) fn history_of(file: &CaseFile, observer: &dyn Observer) -> Result<History, Error> {
+    let end_s = prepare(file, Path::new(""), RunOptions::default(), &alone())?
+        .3
+        .end_s;
     let (mut setup, mut plan, ..) = prepare(
         &file.for_history(end_s),
         Path::new(""),
@@ -162,7 +117,7 @@ pub(crate) fn of_history(file: &CaseFile, observer: &dyn Observer) -> Result<His
     Ok(history)
 }
 
-/// Keeps the history of a run.
+/// Records the history of a run.
 struct Recorder<'a> {
     meter: Option<WakeMeter>,
     history: History,

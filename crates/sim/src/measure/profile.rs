@@ -191,7 +191,6 @@ impl LineOptics<'_> {
         // Single precision: its rounding is far below the error of any number of realisations.
         let estimate = instrument
             .monte_carlo(&t, &range_m, scene.seed)?
-            .0
             .run_in::<f32>(Stop::after(t.realisations), |progress| {
                 observer.advance((progress.done - seen) as u64);
                 seen = progress.done;

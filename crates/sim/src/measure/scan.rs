@@ -38,8 +38,6 @@ pub struct Scanner<'a> {
     efficiency: Option<LayerEfficiency>,
     /// The air that the pulse before lights meanwhile, if the scene asks for its echo.
     previous: Option<Vec<LineOfSight>>,
-    /// The realisation of the scene with which it begins: what was made before it is not made again.
-    pub(crate) first: usize,
 }
 
 impl<'a> Scanner<'a> {
@@ -109,7 +107,6 @@ impl<'a> Scanner<'a> {
             spread_m_s,
             efficiency,
             previous,
-            first: 0,
         })
     }
 
@@ -188,8 +185,7 @@ impl<'a> Scanner<'a> {
         observer: &dyn Observer,
     ) -> Result<(Array2<T>, Clipped), Error> {
         let schedule = &self.plan.geometry.schedule;
-        let index =
-            |key: PulseKey| (self.first + realisation) * self.pulses() + pulses.start + key.pulse;
+        let index = |key: PulseKey| realisation * self.pulses() + pulses.start + key.pulse;
         let airs = self.airs_of_pulses(&pulses)?;
         let scan = Scan {
             simulator: &self.simulator,

@@ -41,8 +41,6 @@ pub struct Plan {
     pub stages: Vec<PlannedStage>,
     /// Computing time on one core, s, to a factor of two.
     pub core_s: f64,
-    /// The same by what takes it.
-    pub(crate) times: time::Times,
     /// Phase screens of each stretch of range that has its own.
     pub(crate) screens: optics::ScreenPlans,
     /// Largest radial velocity of the air on the lines of sight, seen from the lidar, m/s.
@@ -82,13 +80,12 @@ impl Plan {
                 optics::stages(&setup, target, planned, &mut warnings)?;
             let sizes = sizes::Sizes::new(scene, target, &setup.geometry);
             let stages = stages::stages(&setup, target, &sizes, optics);
-            let times = time::times(scene, target, &sizes, optics_s);
+            let core_s = time::core_s(scene, target, &sizes, optics_s);
             let mut plan = Self {
                 setup,
                 target,
                 stages,
-                core_s: times.total_s(),
-                times,
+                core_s,
                 screens,
                 fastest_m_s,
                 warnings,

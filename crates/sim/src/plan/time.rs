@@ -4,30 +4,8 @@ use super::sizes::Sizes;
 use super::stage::Target;
 use crate::scene::{Flow, Method, RegionRadius, RetrievalMethod, Scene, WindOfPulses};
 
-/// Time of a run by what takes it, s.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Times {
-    /// Phase screens and quadratures.
-    pub(crate) optics_s: f64,
-    /// The records of all realisations.
-    pub(crate) signals_s: f64,
-    /// Estimates, their errors, and the files of them.
-    pub(crate) maps_s: f64,
-    /// Vortices of every realisation.
-    pub(crate) retrieval_s: f64,
-    /// Vortices fitted to one map, whether or not the scene asks for them.
-    pub(crate) fit_s: f64,
-}
-
-impl Times {
-    /// Of the whole, s: at least that of small files.
-    pub(crate) fn total_s(&self) -> f64 {
-        0.01 + self.optics_s + self.signals_s + self.maps_s + self.retrieval_s
-    }
-}
-
-/// Times of a run whose optics take `optics_s`, s.
-pub(super) fn times(scene: &Scene, target: Target, n: &Sizes, optics_s: f64) -> Times {
+/// Time of a run on one core whose optics take `optics_s`, s; at least that of small files.
+pub(super) fn core_s(scene: &Scene, target: Target, n: &Sizes, optics_s: f64) -> f64 {
     let wind_of = |flow: &Flow| match flow {
         Flow::Simulated(_) | Flow::Fields(_) => 4e-7,
         _ => 7e-8,
@@ -54,13 +32,7 @@ pub(super) fn times(scene: &Scene, target: Target, n: &Sizes, optics_s: f64) -> 
     } else {
         0.0
     };
-    Times {
-        optics_s,
-        signals_s,
-        maps_s,
-        retrieval_s,
-        fit_s: n.cells * FIT_S,
-    }
+    0.01 + optics_s + signals_s + maps_s + retrieval_s
 }
 
 /// Estimates, their errors, and the files of them.

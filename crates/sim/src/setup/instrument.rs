@@ -122,7 +122,7 @@ impl Instrument {
         }
     }
 
-    /// The Monte Carlo of the turbulence for given ranges, m, increasing, and the time of a realisation on one core, s.
+    /// The Monte Carlo of the turbulence for given ranges, m, increasing.
     ///
     /// # Errors
     /// As [`Instrument::screen_plans`]; air without turbulence.
@@ -131,7 +131,7 @@ impl Instrument {
         t: &RefractiveTurbulence,
         range_m: &[f64],
         seed: u64,
-    ) -> Result<(optics::MonteCarlo, f64), Error> {
+    ) -> Result<optics::MonteCarlo, Error> {
         let plan = self.screen_plans(t, &[range_m])?.pop();
         let (Some(plan), Some(turbulence)) = (plan, &self.turbulence) else {
             return Err(optics::Error::Length {
@@ -141,7 +141,7 @@ impl Instrument {
             }
             .into());
         };
-        let run = optics::MonteCarlo {
+        Ok(optics::MonteCarlo {
             telescope: self.telescope,
             misalignment: optics::Misalignment::NONE,
             turbulence: turbulence.clone(),
@@ -150,8 +150,7 @@ impl Instrument {
             range_m: range_m.to_vec(),
             seed,
             sampling: optics::monte_carlo::Sampling::Antithetic,
-        };
-        Ok((run, plan.realisation_cpu_s))
+        })
     }
 }
 

@@ -25,7 +25,7 @@ mod tables;
 pub(crate) use cases::set;
 pub use cases::{Case, MOST_CASES, Request, Sweep};
 pub(crate) use circulation::Retrieval;
-pub(crate) use run::{Common, measured};
+pub(crate) use run::Common;
 pub use run::{Settings, Shard, Summary, maps, run};
 pub use tables::merge;
 

@@ -214,7 +214,25 @@ pub fn maps(
     scenes: &[SceneFile],
     observer: &dyn Observer,
 ) -> Result<Vec<(Plan, VelocityEstimates)>, Error> {
-    measured(scenes, 0, &Common::default(), observer, |_, _, map| Ok(map))
+    let common = Common::default();
+    let mut out: Vec<(usize, (Plan, VelocityEstimates))> = Vec::with_capacity(scenes.len());
+    for indices in groups(scenes.iter()) {
+        let plans: Vec<Plan> = indices
+            .iter()
+            .map(|&i| common.plan(&scenes[i], Target::Map))
+            .collect::<Result<_, _>>()?;
+        let scanner = Scanner::with(&plans[0], &common.efficiencies, observer)?;
+        let found = map::of_plans(
+            &plans.iter().collect::<Vec<_>>(),
+            &scanner,
+            observer,
+            |_, _| (),
+        )?;
+        drop(scanner);
+        out.extend(indices.into_iter().zip(plans.into_iter().zip(found)));
+    }
+    out.sort_by_key(|(index, _)| *index);
+    Ok(out.into_iter().map(|(_, found)| found).collect())
 }
 
 /// Winds, plans of phase screens and efficiencies that scenes have in common, whenever they are measured.
@@ -222,7 +240,7 @@ pub fn maps(
 pub(crate) struct Common {
     winds: Known<SceneWind>,
     screens: Known<Vec<ScreenPlan>>,
-    efficiencies: Efficiencies,
+    pub(crate) efficiencies: Efficiencies,
 }
 
 impl Common {
@@ -242,44 +260,6 @@ impl Common {
         let wind = self.winds.of(cause, || SceneWind::new(scene))?;
         Plan::sharing(scene.clone(), target, wind, &self.screens)
     }
-
-    /// How often phase screens were planned.
-    pub(crate) fn planned(&self) -> usize {
-        self.screens.len()
-    }
-}
-
-/// [`maps()`] that begin with the realisation `first` of the scenes, each as `finish` takes it.
-pub(crate) fn measured<T>(
-    scenes: &[SceneFile],
-    first: usize,
-    common: &Common,
-    observer: &dyn Observer,
-    mut finish: impl FnMut(&Plan, &Scanner<'_>, VelocityEstimates) -> Result<T, Error>,
-) -> Result<Vec<(Plan, T)>, Error> {
-    let mut out: Vec<(usize, (Plan, T))> = Vec::with_capacity(scenes.len());
-    for places in groups(scenes.iter()) {
-        let plans: Vec<Plan> = places
-            .iter()
-            .map(|&i| common.plan(&scenes[i], Target::Map))
-            .collect::<Result<_, _>>()?;
-        let mut scanner = Scanner::with(&plans[0], &common.efficiencies, observer)?;
-        scanner.first = first;
-        let found = map::of_plans(
-            &plans.iter().collect::<Vec<_>>(),
-            &scanner,
-            observer,
-            |_, _| (),
-        )?;
-        let found = plans
-            .iter()
-            .zip(found)
-            .map(|(plan, map)| finish(plan, &scanner, map));
-        let found: Vec<T> = found.collect::<Result<_, _>>()?;
-        out.extend(places.into_iter().zip(plans.into_iter().zip(found)));
-    }
-    out.sort_by_key(|(place, _)| *place);
-    Ok(out.into_iter().map(|(_, found)| found).collect())
 }
 
 /// Plans every case, and finds out whether it fits the memory; returns the forecast of the time of each, s of one core.

@@ -1,19 +1,18 @@
-//! `wakescope accuracy`: keys that are known to be good or bad, budgets, targets out of reach, threads.
+//! `wakescope accuracy`: settings of a scene and of a flow, threads, refusals.
 
 use super::wakescope;
 use std::path::Path;
-use wakescope_sim::accuracy::Accuracy;
-use wakescope_sim::accuracy::Request;
-use wakescope_sim::accuracy::figures::Figure;
-use wakescope_sim::accuracy::keys::{GRID_SPACING, LAYERS, WINDOW_STEP};
-use wakescope_sim::accuracy::ladder::Verdict;
+use wakescope_sim::accuracy::keys::{GRID_POINTS, WINDOW_STEP};
+use wakescope_sim::accuracy::keys::{GRID_SPACING, LAYERS, PADDED, PATHS, REALISATIONS};
+use wakescope_sim::accuracy::metrics::Metric;
+use wakescope_sim::accuracy::{Report, Request};
 use wakescope_sim::{SceneFile, Silent};
 
 const SCENE: &str = "seed = 5\n[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n[scan]\nelevation_min_rad = 0.1\n\
                      elevation_max_rad = 0.11\nelevation_step_rad = 2.5e-3\nrange_min_m = 350.0\nrange_max_m = 420.0\n\
                      pulses_per_line = 16\nrealisations = 8\n";
 
-/// A collimated beam through weak turbulence that both ways share.
+/// A collimated beam through weak turbulence that both paths share.
 const TURBULENT: &str = "seed = 5\n[scan]\nelevation_min_rad = 0.1\nelevation_max_rad = 0.105\nelevation_step_rad = 2.5e-3\n\
                          range_min_m = 350.0\nrange_max_m = 420.0\npulses_per_line = 2\nrealisations = 8\n\
                          [atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-14\ngrid_points = 64\n\
@@ -23,267 +22,162 @@ const TURBULENT: &str = "seed = 5\n[scan]\nelevation_min_rad = 0.1\nelevation_ma
 /// A small wake, which cannot be right and is quick.
 const WAKE: &str = "[case]\nkind = \"wake\"\ncells = [8, 24, 24]\ncore_radius = 0.3\n[wake]\nend_tau = 0.1\nevery_tau = 0.02\n";
 
-fn of(scene: &str, request: &Request) -> Accuracy {
-    Accuracy::of(
-        &SceneFile::parse(scene, Path::new("s.toml")).unwrap(),
-        request,
-        &Silent,
-    )
-    .unwrap()
-}
-
-#[test]
-fn settings_that_lose_gates_are_never_chosen_and_the_budget_is_kept() {
-    let found = of(SCENE, &Request::new(0.5, &[Figure::Rms, Figure::Std]));
-    let step = found
-        .ladders
-        .iter()
-        .find(|ladder| ladder.key == WINDOW_STEP)
-        .unwrap();
-    let lost = step
-        .steps
-        .iter()
-        .find(|step| matches!(step.verdict, Verdict::Lost(_)));
-    assert!(
-        lost.is_some_and(
-            |step| step.value > found.scene.content.estimator.window_step_samples as f64
-        ),
-        "{step:?}"
-    );
-    assert!(
-        found.spent_s <= 1.2 * found.allowed_s,
-        "{} {}",
-        found.spent_s,
-        found.allowed_s
-    );
-    assert!(found.verified.is_confirmed);
-    for (figure, _, shift) in &found.verified.rows {
-        assert!(shift.bound() <= 0.5, "{figure:?} {shift:?}");
-    }
-}
-
-#[test]
-fn a_target_out_of_reach_is_answered_with_a_forecast() {
-    let found = of(SCENE, &Request::new(1e-3, &[Figure::Std]));
-    let [noise] = found.noises[..] else {
-        panic!("{:?}", found.noises)
+fn report(scene: &str, within: f64, of: &[Metric]) -> Report {
+    let file = SceneFile::parse(scene, Path::new("s.toml")).unwrap();
+    let request = Request {
+        within,
+        of: of.to_vec(),
     };
-    assert!(
-        !found.is_reached() && !noise.is_reached && noise.of_budget > 1e-3,
-        "{noise:?}"
-    );
-    // By the square-root law.
-    let expected = 8.0 * (noise.now / 1e-3).powi(2);
-    assert!(
-        (noise.needed / expected - 1.0).abs() < 0.2,
-        "{} {expected}",
-        noise.needed
-    );
-    assert!(noise.forecast_s > found.allowed_s && found.spent_s <= 1.2 * found.allowed_s);
-    assert_eq!(
-        found.scene.content.scan.realisations, 8,
-        "the noise stays as it is"
-    );
+    Report::of_scene(&file, &request, &Silent).unwrap()
 }
 
 #[test]
-fn two_layers_of_weak_turbulence_shift_a_collimated_beam_by_less_than_a_fifth_of_a_percent() {
-    let found = of(
-        TURBULENT,
-        &Request::new(0.05, &[Figure::Efficiency, Figure::Rms]),
+fn values_that_lose_gates_are_never_recommended() {
+    let found = report(SCENE, 0.5, &[Metric::Rms]);
+    let keys: Vec<&str> = found.settings.iter().map(|setting| setting.key).collect();
+    assert_eq!(keys, [WINDOW_STEP, PADDED, REALISATIONS]);
+    let step = &found.settings[0];
+    let lossy = step.rows.iter().find(|row| row.lost > 0.0).unwrap();
+    // The gates that are left have the same errors.
+    assert!(
+        lossy.shifts.iter().all(|(_, shift)| shift.bound() < 0.5),
+        "{lossy:?}"
     );
-    let layers = found
-        .ladders
+    let cheapest = step.cheapest(0.5).unwrap();
+    assert!(cheapest.lost == 0.0 && cheapest.value < lossy.value);
+    assert!(found.text().contains("% of the gates"));
+    // The standard error of the noise falls with the root of the number of realisations.
+    let noise = &found.settings[2].rows;
+    let errors: Vec<f64> = noise
         .iter()
-        .find(|ladder| ladder.key == LAYERS)
-        .unwrap();
-    let two = layers.steps.iter().find(|step| step.value == 2.0).unwrap();
-    assert!(
-        two.verdict == Verdict::Kept && two.shifts[0].1.bound() <= 2e-3,
-        "{two:?}"
-    );
-    assert!(
+        .map(|row| row.shift(Metric::Rms).unwrap().standard_error)
+        .collect();
+    let values: Vec<f64> = noise.iter().map(|row| row.value).collect();
+    assert_eq!(values, [16.0, 8.0, 4.0, 2.0]);
+    assert!((errors[3] / errors[1] - 2.0).abs() < 1e-12 && errors[1] > 0.01);
+}
+
+#[test]
+fn phase_screens_are_assessed_by_theory_and_by_their_realisations() {
+    let found = report(TURBULENT, 0.05, &[Metric::Efficiency, Metric::Rms]);
+    let setting = |key: &str| {
         found
-            .notes
+            .settings
             .iter()
-            .any(|note| note.contains("independent paths")),
+            .find(|setting| setting.key == key)
+            .unwrap()
+    };
+    for row in &setting(LAYERS).rows {
+        let efficiency = row.shift(Metric::Efficiency).unwrap();
+        assert!(
+            efficiency.standard_error == 0.0 && efficiency.bound() <= 2e-3,
+            "{row:?}"
+        );
+        // The signal-to-noise ratio acts on the errors of the map less than in proportion.
+        assert!(row.shift(Metric::Rms).unwrap().bound() < efficiency.bound() + 1e-3);
+    }
+    assert!(
+        found.notes.iter().any(|note| note.contains("bistatic")),
         "{:?}",
         found.notes
     );
-    assert!(
-        layers.value() <= 2.0 && found.spent_s <= 1.2 * found.allowed_s,
-        "{} {}",
-        found.spent_s,
-        found.allowed_s
-    );
-    let grid = found
-        .ladders
+    let refused = setting(GRID_SPACING)
+        .rows
         .iter()
-        .find(|ladder| ladder.key == GRID_SPACING)
-        .unwrap();
-    assert!(grid.steps.iter().any(
-        |step| matches!(&step.verdict, Verdict::Refused(why) if why.contains("grid_spacing_m"))
-    ));
-    for (figure, _, shift) in &found.verified.rows {
-        assert!(shift.bound() <= 0.05, "{figure:?} {shift:?}");
+        .find_map(|row| row.refused.as_ref());
+    assert!(refused.is_some_and(|reason| !reason.is_empty()));
+    let noise = setting(PATHS).given_row().unwrap();
+    let noise = noise.shift(Metric::Efficiency).unwrap().standard_error;
+    let grids = &setting(GRID_POINTS).rows;
+    let of_given = grids.iter().find(|row| row.value == 64.0).unwrap();
+    assert!(of_given.shift(Metric::Efficiency).unwrap().standard_error < 3.0 * noise);
+    assert!(noise > 1e-4 && noise < 0.05, "{noise}");
+}
+
+/// The table without run times and what follows from them.
+fn without_times(path: &Path) -> String {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut out = String::new();
+    for line in text.lines() {
+        let kept = match line.starts_with('#') {
+            true => line,
+            false => line.rsplitn(4, ',').last().unwrap(),
+        };
+        out += kept;
+        out += "\n";
     }
+    assert!(out.contains("setting,value,metric,shift,standard_error,status\n"));
+    out
 }
 
 #[test]
-fn files_have_the_same_bytes_for_any_number_of_threads_but_for_times() {
+fn shifts_have_the_same_bytes_for_any_number_of_threads() {
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("s.toml"), SCENE).unwrap();
     std::fs::write(temp.path().join("c.toml"), WAKE).unwrap();
-    let without_times = |folder: &str, file: &str| -> String {
-        let bytes = std::fs::read(temp.path().join(folder).join(file)).unwrap();
-        let text = String::from_utf8_lossy(&bytes).into_owned();
-        if file != "accuracy.csv" {
-            return text;
-        }
-        let header: Vec<&str> = text
-            .lines()
-            .find(|line| line.starts_with("key,"))
-            .unwrap()
-            .split(',')
-            .collect();
-        let timed = header
-            .iter()
-            .position(|name| *name == "measured_s")
-            .unwrap();
-        let cells = |line: &str| {
-            line.split(',')
-                .enumerate()
-                .filter(|(i, _)| *i != timed)
-                .map(|(_, cell)| cell.to_owned())
-                .collect()
-        };
-        text.lines()
-            .map(|line| {
-                if line.starts_with('#') {
-                    vec![line.to_owned()]
-                } else {
-                    cells(line)
-                }
-                .join(",")
-                    + "\n"
-            })
-            .collect()
-    };
-    let tell = |of: &str, figure: &str, [folder, threads]: [&str; 2]| {
-        let words = [
-            "accuracy",
-            of,
-            "--within",
-            "10%",
-            "--of",
-            figure,
-            "--out",
-            folder,
-            "--threads",
-            threads,
-            "--quiet",
-        ];
-        let out = wakescope(temp.path(), &words);
-        let text = String::from_utf8_lossy(&out.stdout).into_owned();
-        let written = std::fs::read_to_string(temp.path().join(folder).join("accuracy.txt"))
-            .unwrap_or_default();
-        let told = String::from_utf8_lossy(&out.stderr);
-        assert!(
-            !written.is_empty() && text.starts_with(&written),
-            "the screen shows the file: {text}{told}"
-        );
-        assert_eq!(
-            out.status.code(),
-            Some(i32::from(written.contains("not reached"))),
-            "{text}{told}"
-        );
-        written
-    };
-    for (of, figure, folders) in [
-        ("s.toml", "rms", ["one", "two"]),
-        ("c.toml", "height", ["a", "b"]),
+    for (file, metric, given) in [
+        ("s.toml", "rms", "8 (given)"),
+        ("c.toml", "height", "x 24 (given)"),
     ] {
-        tell(of, figure, [folders[0], "1"]);
-        let written = tell(of, figure, [folders[1], "2"]);
-        let is_case = of == "c.toml";
-        assert!(
-            !is_case || written.contains("8 x 24 x 24") && written.contains("4 x 12 x 12"),
-            "{written}"
-        );
-        let own = if is_case {
-            "case_accuracy.toml"
-        } else {
-            "scene_accuracy.toml"
-        };
-        let mut files = [
-            "accuracy.csv",
-            "accuracy.png",
-            "accuracy.svg",
-            "accuracy.txt",
-            own,
-        ];
-        files.sort_unstable();
-        assert_eq!(super::cli::names(&temp.path().join(folders[0])), files);
-        for file in files {
-            assert!(
-                without_times(folders[0], file) == without_times(folders[1], file),
-                "{file}"
+        let mut tables = Vec::new();
+        for threads in ["1", "2"] {
+            let folder = format!("{file}-{threads}");
+            let line = format!(
+                "accuracy {file} --within 10% --of {metric} --out {folder} --threads {threads} --quiet"
             );
+            let out = wakescope(temp.path(), &line.split(' ').collect::<Vec<_>>());
+            let text = String::from_utf8_lossy(&out.stdout).into_owned();
+            let error = String::from_utf8_lossy(&out.stderr);
+            let is_reached = !text.contains("no value is within");
+            assert_eq!(
+                out.status.code(),
+                Some(i32::from(!is_reached)),
+                "{text}{error}"
+            );
+            assert!(
+                text.contains(given) && text.contains("cheapest within"),
+                "{text}"
+            );
+            let folder = temp.path().join(folder);
+            assert_eq!(
+                super::cli::names(&folder),
+                ["accuracy.csv", "accuracy.png", "accuracy.svg"]
+            );
+            tables.push(without_times(&folder.join("accuracy.csv")));
         }
+        assert!(tables[0] == tables[1], "{tables:?}");
     }
-    let out = wakescope(
-        temp.path(),
-        &["wake", "a/case_accuracy.toml", "--out", "run", "--quiet"],
-    );
-    assert!(
-        out.status.success(),
-        "{}",
-        String::from_utf8_lossy(&out.stderr)
-    );
-    // The scene that it wrote is one, and this program's own.
-    let out = wakescope(
-        temp.path(),
-        &["check", "one/scene_accuracy.toml", "--quiet"],
-    );
-    assert!(
-        out.status.success(),
-        "{}",
-        String::from_utf8_lossy(&out.stderr)
-    );
-    let again = [
-        "accuracy", "s.toml", "--within", "10%", "--of", "rms", "--out", "one", "--quiet",
-    ];
-    assert!(matches!(
-        wakescope(temp.path(), &again).status.code(),
-        Some(0 | 1)
-    ));
 }
 
 #[test]
-fn what_cannot_be_asked_is_refused_with_what_can() {
+fn wrong_options_are_refused_with_what_is_allowed() {
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("s.toml"), SCENE).unwrap();
-    for (words, wanted) in [
-        (["--within", "0"], "from 0.001% to 50%"),
-        (["--within", "3%,4"], "from 0.001% to 50%"),
-        (["--of", "colour"], "possible values"),
-        (["--of", "u"], "\"vad\" or \"dbs\""),
-        (["--of", "height"], "the case of a flow"),
-        (["--budget", "0.5"], "from 1 to 1000000"),
+    std::fs::write(temp.path().join("c.toml"), WAKE).unwrap();
+    for (line, expected) in [
+        ("s.toml --within 0", "from 0.001% to 50%"),
+        ("s.toml --within 3%,4", "from 0.001% to 50%"),
+        ("s.toml --within 3% --of colour", "possible values"),
+        (
+            "s.toml --within 3% --of u",
+            "u is no metric of this scene, which has: bias, std, rms",
+        ),
+        (
+            "s.toml --within 3% --of height",
+            "height is no metric of this scene",
+        ),
+        (
+            "c.toml --within 3% --of rms",
+            "rms is no metric of this case",
+        ),
+        ("s.toml --within 3% --budget 10", "--budget"),
     ] {
-        let more: &[&str] = if words[0] == "--within" {
-            &[]
-        } else {
-            &["--within", "3%"]
-        };
-        let out = wakescope(
-            temp.path(),
-            &[&["accuracy", "s.toml", "--out", "o"], &words[..], more].concat(),
-        );
-        let told = String::from_utf8_lossy(&out.stderr);
+        let line = format!("accuracy {line} --out o");
+        let out = wakescope(temp.path(), &line.split(' ').collect::<Vec<_>>());
+        let error = String::from_utf8_lossy(&out.stderr);
         assert!(
-            out.status.code() == Some(2) && told.contains(wanted),
-            "{words:?}: {told}"
+            out.status.code() == Some(2) && error.contains(expected),
+            "{line}: {error}"
         );
     }
     assert!(!temp.path().join("o").exists());
