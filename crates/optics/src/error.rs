@@ -101,15 +101,16 @@ pub enum Error {
     },
     /// The beam has too many Fresnel zones for a quadrature.
     #[error(
-        "the Fresnel number a^2 |1/R - 1/F| / lambda is {found:.4e} at {range_m:?} m, {:?} at most: the range must be nearer to \
-         the focus, or the aperture smaller",
-        crate::theory::LARGEST_FRESNEL_NUMBER
+        "the Fresnel number a^2 |1/R - 1/F| / lambda is {found:.4e} at {range_m:?} m, {largest:?} at most: the range must be nearer to \
+         the focus, or the aperture smaller"
     )]
     FresnelNumber {
         /// Range at which it was found \[m\].
         range_m: f64,
         /// The Fresnel number there.
         found: f64,
+        /// The largest that is allowed.
+        largest: f64,
     },
     /// A quadrature did not reach its tolerance.
     #[error(

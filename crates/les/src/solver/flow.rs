@@ -10,15 +10,16 @@
 //! Check: energy and momentum without viscosity, orders in space and time, exact solutions, bits
 //! against threads and restart.
 
+use momentum_rhs::{PredictedField, Prediction};
 use rayon::prelude::*;
 
+mod momentum_rhs;
 mod project;
 
 use super::component_operators::ComponentOperators;
 use super::implicit::LineSolvers;
 use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
-use super::momentum_rhs::{PredictedField, Prediction};
 use super::pressure::{PressureSolver, Solved, accept_round_off};
 use super::projection::{Divergence, correct, weighted_dot};
 use super::report::{Powers, StartReport, StepReport};

@@ -18,7 +18,6 @@ pub(crate) mod layout;
 #[cfg(test)]
 mod literal;
 pub(crate) mod mesh;
-mod momentum_rhs;
 mod operators_1d;
 pub(crate) mod planes;
 mod pressure;

@@ -164,7 +164,7 @@ pub(crate) fn check_grid(
 ) -> Result<(), Error> {
     let limits = beam_limits_m(&telescope.validated()?, &misalignment.validated()?, range_m);
     let grid = grid.validated()?;
-    let violations = violations_of(&limits, &grid);
+    let violations = violations_of(&limits, grid.largest_spacing_m(), grid.smallest_width_m());
     if violations.is_empty() {
         Ok(())
     } else {

@@ -161,7 +161,7 @@ impl<'a> Limits<'a> {
             limits_m.push((Limit::Light, light.width_m(LARGEST_LOSS, spacing_m)));
         }
         Ok(Verdict {
-            violations: violations_of(&limits_m, &grid),
+            violations: violations_of(&limits_m, grid.largest_spacing_m(), grid.smallest_width_m()),
             light_lost,
         })
     }

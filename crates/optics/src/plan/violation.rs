@@ -1,7 +1,6 @@
 //! Limits of a transverse grid, their violations, and a set-up without violations, in numbers that
 //! a user can copy.
 
-use crate::screens::grid::Grid;
 use std::fmt;
 
 /// A limit on the grid of a Monte Carlo.
@@ -59,18 +58,16 @@ pub struct Violation {
 }
 
 impl Violation {
-    /// The violation of a largest spacing or a smallest width `limit_m` \[m\] by a
-    /// grid, if it is one.
-    fn by_grid(limit: Limit, limit_m: f64, grid: &Grid) -> Option<Self> {
+    /// The violation of a largest spacing or a smallest width `limit_m` \[m\] by a grid of this
+    /// spacing and width, if it is one.
+    fn by_grid(limit: Limit, limit_m: f64, spacing_m: f64, width_m: f64) -> Option<Self> {
         if limit.is_spacing() {
-            let spacing_m = grid.largest_spacing_m();
             return (spacing_m > limit_m).then(|| Self {
                 limit,
                 needed: not_above(limit_m),
                 found: spacing_m,
             });
         }
-        let width_m = grid.smallest_width_m();
         (width_m < limit_m).then(|| Self {
             limit,
             needed: not_below(limit_m),
@@ -79,11 +76,16 @@ impl Violation {
     }
 }
 
-/// The limits \[m\], largest spacings and smallest widths, that a grid violates.
-pub(crate) fn violations_of(limits_m: &[(Limit, f64)], grid: &Grid) -> Vec<Violation> {
+/// The limits \[m\], largest spacings and smallest widths, that a grid with this largest spacing and
+/// this smallest width violates.
+pub(crate) fn violations_of(
+    limits_m: &[(Limit, f64)],
+    spacing_m: f64,
+    width_m: f64,
+) -> Vec<Violation> {
     limits_m
         .iter()
-        .filter_map(|&(limit, limit_m)| Violation::by_grid(limit, limit_m, grid))
+        .filter_map(|&(limit, limit_m)| Violation::by_grid(limit, limit_m, spacing_m, width_m))
         .collect()
 }
 

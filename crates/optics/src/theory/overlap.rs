@@ -57,7 +57,11 @@ pub(crate) fn check_fresnel_number(telescope: &Telescope, range_m: f64) -> Resul
     if found <= LARGEST_FRESNEL_NUMBER {
         return Ok(());
     }
-    Err(Error::FresnelNumber { range_m, found })
+    Err(Error::FresnelNumber {
+        range_m,
+        found,
+        largest: LARGEST_FRESNEL_NUMBER,
+    })
 }
 
 /// Evaluates M(rho) of one telescope for one wave-front curvature.
@@ -261,7 +265,7 @@ mod tests {
             ..Telescope::table2()
         };
         match efficiency_with(&t, &Misalignment::NONE, 1000.0, &|_| 0.0) {
-            Err(error @ Error::FresnelNumber { range_m, found }) => {
+            Err(error @ Error::FresnelNumber { range_m, found, .. }) => {
                 assert_eq!(range_m, 1000.0);
                 assert!(error.to_string().contains("3000.0 at most"), "{error}");
                 assert!((found / 9.07e6 - 1.0).abs() < 1e-2, "{found}");

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use super::super::mesh::Mesh;
 use super::VortexPairCase;
+use crate::Error;
 
 /// Cells of the mesh of a vortex pair across the lengths that it must resolve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +24,7 @@ const LAYER_CELLS: f64 = 3.0;
 impl Resolution {
     /// Of the pair in its own units, in which its mesh has the given faces. The boundary layer is `sqrt(nu b0/V0)` thick with
     /// `nu = 2 pi b0 V0/reynolds`.
-    pub(super) fn new(mesh: &Mesh, pair: &VortexPairCase) -> Self {
+    fn new(mesh: &Mesh, pair: &VortexPairCase) -> Self {
         let core = [0.5, pair.height];
         let core_cells =
             std::array::from_fn(|i| pair.core_radius / cell_width(&mesh.face_m(i + 1), core[i]));
@@ -64,6 +65,16 @@ impl Resolution {
             warnings.push(format!("{text}, or a lower Reynolds number"));
         }
         warnings
+    }
+}
+
+impl VortexPairCase {
+    /// How well the mesh of the case resolves its cores and the boundary layer under them.
+    ///
+    /// # Errors
+    /// A mesh that [`Mesh::new`] refuses.
+    pub fn resolution(&self) -> Result<Resolution, Error> {
+        Ok(Resolution::new(&self.mesh(1.0)?, self))
     }
 }
 

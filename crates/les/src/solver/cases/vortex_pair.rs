@@ -17,7 +17,7 @@ use super::super::mesh::{Direction, Ends, Mesh, Spread, Wall};
 use super::super::settings::{FlowSettings, TimeScheme, TimeStep};
 use super::super::subgrid::SubgridModel;
 use super::perturbation::Perturbation;
-use super::{Case, Initial, Resolution, stretched};
+use super::{Case, Initial, stretched};
 use crate::analysis::{WakeMeter, WakeScales};
 use crate::error::{Error, check};
 use crate::winds::{CirculationProfile, TwoScale};
@@ -175,14 +175,6 @@ impl VortexPairCase {
         Ok(meter.moving_with([-1.0, 1.0].map(|side| [drift_m_s + side * out_m_s, down_m_s])))
     }
 
-    /// How well the mesh of the case resolves its cores and the boundary layer under them.
-    ///
-    /// # Errors
-    /// A mesh that [`Mesh::new`] refuses.
-    pub fn resolution(&self) -> Result<Resolution, Error> {
-        Ok(Resolution::new(&self.mesh(1.0)?, self))
-    }
-
     fn validate(&self) -> Result<(), Error> {
         check("height", self.height, "positive, below the top", |h| {
             h > 0.0 && h < self.size[2]
@@ -220,7 +212,7 @@ impl VortexPairCase {
     }
 
     /// The mesh in units of `unit_m` \[m\].
-    fn mesh(&self, unit_m: f64) -> Result<Mesh, Error> {
+    pub(super) fn mesh(&self, unit_m: f64) -> Result<Mesh, Error> {
         let [length, width, height] = self.size.map(|l| l * unit_m);
         let x = Direction::periodic(self.cells[0], 0.0, length);
         let mut y = Direction::periodic(self.cells[1], -0.5 * width, 0.5 * width);

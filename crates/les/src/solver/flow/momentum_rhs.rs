@@ -3,14 +3,14 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::aligned::Aligned;
-use super::component_operators::Scratch;
-use super::flow::Flow;
-use super::layout::Shape;
-use super::projection::weighted_dot;
-use super::report::Powers;
-use super::settings::Stage;
+use super::Flow;
 use crate::Error;
+use crate::solver::aligned::Aligned;
+use crate::solver::component_operators::Scratch;
+use crate::solver::layout::Shape;
+use crate::solver::projection::weighted_dot;
+use crate::solver::report::Powers;
+use crate::solver::settings::Stage;
 
 /// Fraction of the explicit limit beyond which the subgrid viscosity is cut. In the core of a
 /// vortex WALE's viscosity has no work to do but would make an explicit step unstable; the cut
