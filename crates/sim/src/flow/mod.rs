@@ -13,6 +13,7 @@ mod files;
 pub(crate) mod forecast;
 mod free;
 mod initial_file;
+mod integration;
 mod kind;
 #[cfg(test)]
 pub(crate) mod plane_vortices;
