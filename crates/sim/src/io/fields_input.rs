@@ -101,10 +101,11 @@ pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<Components
 /// The components of a field, and the lengths of the periods along x and y that its file states for the first of them \[m\].
 type Components = ([VolumeComponent; 3], [Option<f64>; 2]);
 
-/// What the air carries with it in one field, in the units and axes of the file.
+/// A scalar of a field that cannot be negative, in the units and axes of the file.
 ///
 /// # Errors
 /// As [`read`]; a negative value.
+#[cfg(any(feature = "plots", test))]
 pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeComponent, Error> {
     let file = open(&field.path)?;
     let scalar = component(&file, name, field, false).map_err(|reason| file.refuse(reason))?;
