@@ -105,7 +105,7 @@ fn a_dipole_between_walls_repeats_its_stored_numbers() {
         viscous_power_m5_s3: -5.201025432067468,
         subgrid_power_m5_s3: 0.0,
         subgrid_viscosity_m2_s: 0.0,
-        probe_m_s: [0.0, -0.44427866904688373, 0.0],
+        probe_m_s: [0.0, -0.44427866904688373, -0.16191926568845066],
     };
     assert_stored(&case, &[0.0, 0.03], &stored);
 }

@@ -197,7 +197,7 @@ fn a_run_goes_on_with_the_scheme_of_its_checkpoint() {
     let field = PlaneVortices::new();
     let case = |time: &str| vortices(&field, 0.0015, time);
     let scheme = |file: &CaseFile| {
-        Setup::new(&file.content, Path::new(""))
+        Setup::new(&file.content, file.folder())
             .unwrap()
             .settings
             .scheme

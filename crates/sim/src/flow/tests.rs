@@ -360,7 +360,7 @@ fn a_checkpoint_is_not_lost_by_mistake_and_a_damaged_one_gives_way_to_the_one_be
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     let outcome = run(&vortices(None), folder.path(), Begin::Restart, &Silent).unwrap();
     assert!(
-        outcome.is_complete && outcome.warnings[0].contains("damaged"),
+        outcome.is_complete && outcome.warnings.iter().any(|text| text.contains("damaged")),
         "{outcome:?}"
     );
     let fresh = tempfile::tempdir().unwrap();
@@ -575,7 +575,7 @@ fn what_only_the_mesh_tells_is_refused_before_anything_is_written() {
     let message =
         start("[case]\nkind = \"vortex_pair\"\ncells = [1, 16, 9]\nground_stretch = 0.0\n");
     assert!(
-        message.contains("z direction: cells = 9") && message.contains("at least 16"),
+        message.contains("z direction: cells = 9") && message.contains("at least 12"),
         "{message}"
     );
     let message =
