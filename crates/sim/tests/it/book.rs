@@ -93,7 +93,12 @@ fn spans(page: &str) -> Vec<&str> {
 /// Lines of the program in a page: all its blocks, without comments and redirections, 1 for what the shell knows.
 fn command_lines(page: &str) -> Vec<Vec<String>> {
     let lines = page.split("```").skip(1).step_by(2).flat_map(str::lines);
-    let commands = lines.filter(|line| line.starts_with("wakescope ") && !line.contains('['));
+    // Reports begin with the program and its version.
+    let report = concat!("wakescope ", env!("CARGO_PKG_VERSION"), ":");
+    let commands = lines
+        .map(|line| line.strip_prefix("$ ").unwrap_or(line))
+        .filter(|line| line.starts_with("wakescope ") && !line.starts_with(report))
+        .filter(|line| !line.contains('['));
     let number = |part: &str| {
         if part.starts_with('$') {
             "1".to_owned()

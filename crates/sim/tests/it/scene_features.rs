@@ -425,10 +425,11 @@ fn the_ratio_of_every_method_in_every_noise_is_that_of_the_signal() {
         // pairs, which the noise of a band pulls to its middle.
         let is_coarse = window == 16 || estimator.contains("order");
         let is_pair = estimator.contains("pulse_pair");
-        let of_velocity_db = if is_coarse {
-            if is_pair { 0.9 } else { 0.2 }
-        } else {
-            0.02
+        let of_velocity_db = match (is_coarse, is_pair) {
+            (true, true) => 0.9,
+            (true, false) => 0.2,
+            (false, true) => 0.05,
+            (false, false) => 0.02,
         };
         let padded = if is_pair {
             ""
