@@ -96,7 +96,6 @@ fn command_lines(page: &str) -> Vec<Vec<String>> {
     // Reports begin with the program and its version.
     let report = concat!("wakescope ", env!("CARGO_PKG_VERSION"), ":");
     let commands = lines
-        .map(|line| line.strip_prefix("$ ").unwrap_or(line))
         .filter(|line| line.starts_with("wakescope ") && !line.starts_with(report))
         .filter(|line| !line.contains('['));
     let number = |part: &str| {
