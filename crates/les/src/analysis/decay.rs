@@ -22,13 +22,10 @@ pub fn value_at(points: &[(f64, f64)], tau: f64) -> f64 {
 pub fn onset(gamma: &[(f64, f64)]) -> Option<f64> {
     let early_loss = loss(gamma, 0.5, 1.5);
     let last_tau = gamma.last()?.0;
-    let taus = (0..).map(|i| 1.5 + 0.02 * f64::from(i));
-    for tau in taus.take_while(|tau| tau + 0.05 <= last_tau) {
-        if loss(gamma, tau - 0.05, tau + 0.05) / 0.1 > 3.0 * early_loss {
-            return Some(tau);
-        }
-    }
-    None
+    (0..)
+        .map(|i| 1.5 + 0.02 * f64::from(i))
+        .take_while(|tau| tau + 0.05 <= last_tau)
+        .find(|tau| loss(gamma, tau - 0.05, tau + 0.05) / 0.1 > 3.0 * early_loss)
 }
 
 /// Loss of the ratio from one time to another.

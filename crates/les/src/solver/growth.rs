@@ -575,10 +575,13 @@ mod tests {
         );
     }
 
+    /// Viscous number and the Courant number that is the limit at it.
+    type MeasuredLimit = (f64, f64);
+
     /// Limits `(viscous, courant)` of a scheme with viscosity implicit or explicit, measured with
     /// fixed steps on lines of 48 and 64 cells, white noise or the worst wave.
     #[rustfmt::skip]
-    const MEASURED_LIMITS: [(TimeScheme, bool, &[(f64, f64)]); 4] = [
+    const MEASURED_LIMITS: [(TimeScheme, bool, &[MeasuredLimit]); 4] = [
         (RK3, true, &[(0.0, 1.0921), (0.001, 1.099), (0.01, 1.147), (0.1, 1.364), (0.3, 1.546), (0.4, 1.589)]),
         (RK3, false, &[(0.001, 1.101), (0.01, 1.162), (0.1, 1.413), (0.3, 1.453), (0.4, 1.095)]),
         (AB2, true, &[(0.001, 0.204), (0.01, 0.339), (0.03, 0.4195), (0.1, 0.516), (0.15, 0.552)]),

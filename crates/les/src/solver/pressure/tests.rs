@@ -168,6 +168,14 @@ fn meshes() -> Vec<NamedMesh> {
             [slip(12), ground(60).stretched(tanh(2.0)), slip(20)],
             1e-12,
         ),
+    ];
+    meshes.extend(meshes_of_extreme_sizes());
+    meshes.extend(meshes_with_thin_directions());
+    meshes
+}
+
+fn meshes_of_extreme_sizes() -> Vec<NamedMesh> {
+    vec![
         ("smallest", [waves(4), slip(4), ground(12)], 1e-12),
         (
             "nanometres",
@@ -178,9 +186,7 @@ fn meshes() -> Vec<NamedMesh> {
             ],
             1e-12,
         ),
-    ];
-    meshes.extend(meshes_with_thin_directions());
-    meshes
+    ]
 }
 
 fn meshes_with_thin_directions() -> Vec<NamedMesh> {

@@ -72,19 +72,19 @@ fn relative(a: f64, b: f64) -> f64 {
 
 /// Fails unless `found` is at most `bar`.
 fn assert_at_most(name: &str, found: f64, bar: f64) {
-    println!("{name}: {found} (at most {bar})");
+    eprintln!("{name}: {found} (at most {bar})");
     assert!(found <= bar, "{name}: {found}, at most {bar}");
 }
 
 /// Fails unless `found` is at least `bar`.
 fn assert_at_least(name: &str, found: f64, bar: f64) {
-    println!("{name}: {found} (at least {bar})");
+    eprintln!("{name}: {found} (at least {bar})");
     assert!(found >= bar, "{name}: {found}, at least {bar}");
 }
 
 /// Fails unless `found` is within `bar` of `expected`.
 fn assert_within(name: &str, found: f64, expected: f64, bar: f64) {
-    println!("{name}: {found} ({expected} within {bar})");
+    eprintln!("{name}: {found} ({expected} within {bar})");
     let difference = (found - expected).abs();
     assert!(
         difference <= bar,
