@@ -160,7 +160,7 @@ pub struct EnvelopeResult {
 }
 
 /// Circulations of both vortices by velocity envelopes; `about` tells where they are, how large their cores are and what the wind is.
-/// `threshold` is a power over the noise; [`cell_threshold`](crate::estimators::cell_threshold) has the one for a rate of false alarms.
+/// `threshold` is a power over the noise; [`cell_threshold`](crate::estimators::cell_threshold()) has the one for a rate of false alarms.
 ///
 /// # Errors
 /// [`Error::Length`], [`Error::OutOfRange`] for impossible input.

@@ -3,6 +3,18 @@
 //! a dominates b if it is nowhere worse and somewhere better. Equal points all stay; a point with a value that is not finite is
 //! never on the front and dominates none. Check: the stored fronts, and every pair of 1000 random points.
 
+use super::stored::Row;
+
+/// The rows on the front of precision and resolution, in their order.
+pub(super) fn on_front(rows: &[Row]) -> Vec<&Row> {
+    let column = |name: &str| rows.iter().map(|row| row.result(name)).collect();
+    let on_front = front(&[column("resolution_m"), column("std_m_s")]);
+    rows.iter()
+        .zip(on_front)
+        .filter_map(|(row, is_on)| is_on.then_some(row))
+        .collect()
+}
+
 /// Whether each point is on the front; `costs` has a column for each objective, of which small values are better.
 #[must_use]
 pub fn front(costs: &[Vec<f64>]) -> Vec<bool> {

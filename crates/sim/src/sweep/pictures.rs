@@ -2,10 +2,10 @@
 //!
 //! Check: by eye; a test of the program compares the names of the files.
 
+use super::front::on_front;
 use super::key_path::Holds;
 use super::results::results;
 use super::stored::{Definition, Row};
-use super::tables::on_front;
 use crate::Error;
 use crate::outputs::Outputs;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};

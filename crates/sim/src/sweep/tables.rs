@@ -3,7 +3,7 @@
 //! Check: the same rows give the same bytes; the NetCDF file is read back by an independent reader.
 
 use super::cases::Sweep;
-use super::front::front;
+use super::front::on_front;
 use super::key_path::{Holds, VaryingKey};
 use super::results::results;
 use super::stored::{Definition, Row, SWEEP};
@@ -102,16 +102,6 @@ pub(super) fn list(
     #[cfg(feature = "plots")]
     super::pictures::list(definition, rows, files)?;
     Ok(())
-}
-
-/// The rows on the front of precision and resolution, in their order.
-pub(super) fn on_front(rows: &[Row]) -> Vec<&Row> {
-    let column = |name: &str| rows.iter().map(|row| row.result(name)).collect();
-    let on_front = front(&[column("resolution_m"), column("std_m_s")]);
-    rows.iter()
-        .zip(on_front)
-        .filter_map(|(row, is_on)| is_on.then_some(row))
-        .collect()
 }
 
 fn table<'r>(definition: &Definition, rows: impl IntoIterator<Item = &'r Row>) -> Table {
