@@ -80,12 +80,6 @@ pub(super) fn flow(words: &FlowWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
         return Ok(());
     };
     let file = cli.case(case, None)?;
-    if matches!(file.content.case, CaseKind::Wake(_)) {
-        return Err(Error::Input {
-            path: case.clone(),
-            reason: "case.kind is \"wake\": wakescope wake runs it".into(),
-        });
-    }
     simulate(file, &words.run, cli, ranks)
 }
 
