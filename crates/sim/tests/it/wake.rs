@@ -301,13 +301,6 @@ fn presets_print_themselves_and_other_cases_are_refused() {
         other.status.code() == Some(2) && message.contains("wakescope flow"),
         "{message}"
     );
-    std::fs::write(temp.path().join("w.toml"), "[case]\nkind = \"wake\"\n").unwrap();
-    let other = wakescope(temp.path(), &["flow", "w.toml", "--out", "o"]);
-    let message = String::from_utf8(other.stderr).unwrap();
-    assert!(
-        other.status.code() == Some(2) && message.contains("wakescope wake"),
-        "{message}"
-    );
     let nowhere = wakescope(temp.path(), &["wake"]);
     assert!(
         nowhere.status.code() == Some(2)
