@@ -5,48 +5,25 @@
 
 use crate::process::program;
 use fixtures::failure::{Failure, Outcome};
-use std::path::PathBuf;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 use wakescope_tests::audit::{Report, audit};
 
-/// Options of the task.
-#[derive(Debug, clap::Args)]
-pub(crate) struct AuditArgs {
-    /// How many scenes and cases.
-    #[arg(long, default_value_t = 100)]
-    scenes: usize,
-    /// Number of the first one.
-    #[arg(long, default_value_t = 0)]
-    first: usize,
-    /// Seed of the draws.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// The program to run, instead of the release build.
-    #[arg(long, value_name = "FILE")]
-    program: Option<PathBuf>,
-    /// Folder in which scenes and outputs stay, a folder for each draw.
-    #[arg(long, value_name = "DIR")]
-    keep: Option<PathBuf>,
-}
+/// How many scenes and cases continuous integration draws, with which seed.
+pub(crate) const SCENES: usize = 100;
+pub(crate) const SEED: u64 = 1;
 
-impl Default for AuditArgs {
-    /// The draws of continuous integration.
-    fn default() -> Self {
-        Self {
-            scenes: 100,
-            first: 0,
-            seed: 1,
-            program: None,
-            keep: None,
-        }
-    }
-}
-
-/// Runs the draws and prints the table.
+/// Runs the draws of these numbers and prints the table.
 ///
 /// # Errors
 /// Fails if a number is wrong or has no definition.
-pub(crate) fn run(args: &AuditArgs) -> Outcome {
-    checked_report(args).map(drop)
+pub(crate) fn run(
+    given: Option<&Path>,
+    seed: u64,
+    draws: Range<usize>,
+    keep: Option<PathBuf>,
+) -> Outcome {
+    checked_report(given, seed, draws, keep).map(drop)
 }
 
 /// Runs the draws of continuous integration, prints the table and returns it for the page of the book.
@@ -54,24 +31,25 @@ pub(crate) fn run(args: &AuditArgs) -> Outcome {
 /// # Errors
 /// As [`run`].
 pub(crate) fn page() -> Result<String, Failure> {
-    let args = AuditArgs::default();
-    let report = checked_report(&args)?;
-    let last = args.first + args.scenes - 1;
-    Ok(format!(
-        "Draws {} to {last} of seed {}: {}",
-        args.first, args.seed, report.page
-    ))
+    let report = checked_report(None, SEED, 0..SCENES, None)?;
+    let last = SCENES - 1;
+    Ok(format!("Draws 0 to {last} of seed {SEED}: {}", report.page))
 }
 
-fn checked_report(args: &AuditArgs) -> Result<Report, Failure> {
-    let program = program(args.program.as_deref())?;
+fn checked_report(
+    given: Option<&Path>,
+    seed: u64,
+    draws: Range<usize>,
+    keep: Option<PathBuf>,
+) -> Result<Report, Failure> {
+    let program = program(given)?;
     let threads = std::thread::available_parallelism()?.get();
-    let keep = args.keep.as_ref().map(std::path::absolute).transpose()?;
+    let keep = keep.map(std::path::absolute).transpose()?;
     let report = audit(
         &program,
-        args.seed,
-        args.first,
-        args.scenes,
+        seed,
+        draws.start,
+        draws.len(),
         threads,
         keep.as_deref(),
     );

@@ -8,20 +8,12 @@ use fixtures::failure::{Failure, Outcome};
 use wakescope_sim::io::write_atomic;
 use wakescope_tests::curves::{ALL, Curve, Origin};
 
-/// Options of the task.
-#[derive(Debug, clap::Args)]
-pub(crate) struct BlessArgs {
-    /// Names of the curves, as `cargo xtask regress` prints them; `wake`, which the figures of the profile quick look at.
-    #[arg(required = true)]
-    names: Vec<String>,
-}
-
 /// Writes the curves.
 ///
 /// # Errors
 /// An unknown name, a curve of independent origin, or one that cannot be computed.
-pub(crate) fn run(args: &BlessArgs) -> Outcome {
-    for name in &args.names {
+pub(crate) fn run(names: &[String]) -> Outcome {
+    for name in names {
         if name == wakes::NAME {
             wakes::bless()?;
             continue;

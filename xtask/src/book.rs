@@ -56,10 +56,13 @@ pub(crate) fn run() -> Outcome {
 fn write_results(pages: &Path) -> Outcome {
     std::fs::write(pages.join(AUDIT), audit::page()?)?;
     std::fs::write(pages.join(LEFT_OUT), left_out::page()?)?;
-    let measured = work_precision::page()?;
-    std::fs::write(pages.join(WORK_PRECISION), measured.text)?;
-    std::fs::write(pages.join(WORK_PRECISION_CSV), measured.csv)?;
-    std::fs::write(pages.join(WORK_PRECISION_SVG), measured.svg)?;
+    let rows = work_precision::measure(None, false)?;
+    let origin = work_precision::provenance_of_run(false);
+    let csv = work_precision::table(&rows).to_csv(&origin)?;
+    let svg = work_precision::picture(&rows).svg(&origin)?;
+    std::fs::write(pages.join(WORK_PRECISION), work_precision::text(&rows))?;
+    std::fs::write(pages.join(WORK_PRECISION_CSV), csv)?;
+    std::fs::write(pages.join(WORK_PRECISION_SVG), svg)?;
     Ok(())
 }
 

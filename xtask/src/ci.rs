@@ -7,22 +7,9 @@ use crate::process::call;
 use crate::workspace::read;
 use fixtures::failure::{Failure, Outcome};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::process::Command;
 use std::time::Instant;
-
-/// Options of the task.
-#[derive(Debug, clap::Args)]
-pub(crate) struct CiArgs {
-    /// Run only the steps whose name contains this.
-    #[arg(long, value_name = "WORD")]
-    only: Option<String>,
-}
-
-/// What is run, in its order.
-#[derive(Deserialize)]
-struct Steps {
-    step: Vec<Step>,
-}
 
 /// Commands of the shell under one name. In braces stand `xtask`, which is this very program: in another profile the workspace would be compiled
 /// once more; `wakescope`, the program beside it; `bins`, by what cargo builds that in the same profile; and `test`, what a reader of the README runs.
@@ -46,7 +33,7 @@ fn readme_test_command(readme: &str) -> Result<String, Failure> {
 ///
 /// # Errors
 /// The step that failed.
-pub(crate) fn run(args: &CiArgs) -> Outcome {
+pub(crate) fn run(only: Option<&str>) -> Outcome {
     let own = std::env::current_exe()?;
     let program = own.with_file_name("wakescope");
     let bins = if cfg!(debug_assertions) {
@@ -60,13 +47,9 @@ pub(crate) fn run(args: &CiArgs) -> Outcome {
         ("{bins}", bins.into()),
         ("{test}", readme_test_command(&read("README.md")?)?),
     ];
-    let steps: Steps = toml::from_str(include_str!("ci.toml"))?;
-    for step in steps.step {
-        if args
-            .only
-            .as_ref()
-            .is_some_and(|word| !step.name.contains(word))
-        {
+    let steps: BTreeMap<String, Vec<Step>> = toml::from_str(include_str!("ci.toml"))?;
+    for step in steps.into_values().flatten() {
+        if only.is_some_and(|word| !step.name.contains(word)) {
             continue;
         }
         for command in &step.commands {

@@ -8,20 +8,9 @@ use crate::process::{call, children_cpu_s, output, program, run_scene};
 use fixtures::failure::{Failure, Outcome};
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use toml::{Table, Value};
-
-/// Options of the task.
-#[derive(Debug, Default, clap::Args)]
-pub(crate) struct LeftOutArgs {
-    /// The program to run, instead of the release build.
-    #[arg(long, value_name = "FILE")]
-    program: Option<PathBuf>,
-    /// Also compile each crate with its features from nothing, which is slow.
-    #[arg(long)]
-    compile: bool,
-}
 
 /// The scene that has everything, and what is taken out.
 #[derive(Deserialize)]
@@ -57,20 +46,12 @@ struct Package {
     gives: String,
 }
 
-/// What compiling a crate from nothing costs.
-struct Compiled {
-    /// Processor time \[s\].
-    cpu_s: f64,
-    /// Size of the program \[bytes\]; none of a library.
-    program_bytes: Option<f64>,
-}
-
 /// Prints both tables.
 ///
 /// # Errors
 /// Fails if a scene does not run or a crate does not compile.
-pub(crate) fn run(args: &LeftOutArgs) -> Outcome {
-    print!("{}", tables(args)?);
+pub(crate) fn run(given: Option<&Path>, compile: bool) -> Outcome {
+    print!("{}", tables(given, compile)?);
     Ok(())
 }
 
@@ -79,19 +60,16 @@ pub(crate) fn run(args: &LeftOutArgs) -> Outcome {
 /// # Errors
 /// As [`run`].
 pub(crate) fn page() -> Result<String, Failure> {
-    tables(&LeftOutArgs {
-        compile: true,
-        ..LeftOutArgs::default()
-    })
+    tables(None, true)
 }
 
-fn tables(args: &LeftOutArgs) -> Result<String, Failure> {
+fn tables(given: Option<&Path>, compile: bool) -> Result<String, Failure> {
     let scenes: Scenes = toml::from_str(include_str!("left_out.toml"))?;
-    let program = program(args.program.as_deref())?;
+    let program = program(given)?;
     let folder = tempfile::tempdir()?;
     let mut text = scene_table(&scenes, &program, folder.path())?;
     text.push('\n');
-    if args.compile {
+    if compile {
         text += &compile_table(&scenes.package, &folder.path().join("target"))?;
     } else {
         text += &package_table(&scenes.package)?;
@@ -143,11 +121,13 @@ fn compile_table(packages: &[Package], target: &Path) -> Result<String, Failure>
         "| crate | features | gives | crates compiled | processor time of compiling [s] | program [MB] |\n|---|---|---|---|---|---|\n",
     );
     for package in packages {
-        let compiled = package.compile(target)?;
-        let size = compiled
-            .program_bytes
-            .map_or("none".into(), |bytes| format!("{:.1}", bytes / 1e6));
-        text += &format!("{} {:.0} | {size} |\n", package.row()?, compiled.cpu_s);
+        let cpu_s = package.compile(target)?;
+        // A library leaves no program.
+        let size = match std::fs::metadata(target.join("release/wakescope")) {
+            Ok(file) => format!("{:.1}", file.len() as f64 / 1e6),
+            Err(_) => "none".into(),
+        };
+        text += &format!("{} {cpu_s:.0} | {size} |\n", package.row()?);
     }
     Ok(text)
 }
@@ -168,8 +148,8 @@ impl Package {
         ))
     }
 
-    /// Compiles the crate and all that it needs from nothing.
-    fn compile(&self, target: &Path) -> Result<Compiled, Failure> {
+    /// Compiles the crate and all that it needs from nothing and returns the processor time \[s\].
+    fn compile(&self, target: &Path) -> Result<f64, Failure> {
         if target.exists() {
             std::fs::remove_dir_all(target)?;
         }
@@ -178,11 +158,7 @@ impl Package {
         build.args(["build", "--release", "--quiet", "--no-default-features"]);
         build.args(["--package", &self.name, "--features", &self.features]);
         call(build.env("CARGO_TARGET_DIR", target))?;
-        let program = std::fs::metadata(target.join("release/wakescope")).ok();
-        Ok(Compiled {
-            cpu_s: children_cpu_s() - before_s,
-            program_bytes: program.map(|file| file.len() as f64),
-        })
+        Ok(children_cpu_s() - before_s)
     }
 
     /// How many crates cargo compiles for the library, itself among them, without those that only build it.

@@ -31,19 +31,11 @@ const WHOLE: f64 = 8.0;
 /// Planes of halos that leave a slab in a stage with the multiscale model.
 pub(crate) const PLANES: f64 = 63.0;
 
-/// Options of the task.
-#[derive(Debug, clap::Args)]
-pub(crate) struct RanksArgs {
-    /// Also measure two ranks against one, and single exchanges; decides nothing.
-    #[arg(long)]
-    measure: bool,
-}
-
 /// Runs the checks, or prints why there are none.
 ///
 /// # Errors
 /// Fails if the build does, files differ, or a run hangs or succeeds although a process was killed.
-pub(crate) fn run(args: &RanksArgs) -> Outcome {
+pub(crate) fn run(is_measured: bool) -> Outcome {
     if !succeeds(IS_THERE) && !is_installed() {
         println!(
             "skipped: mpicc, mpirun or libclang is missing, and cannot be installed here ({INSTALL})"
@@ -54,7 +46,7 @@ pub(crate) fn run(args: &RanksArgs) -> Outcome {
     let mut build = Command::new(env!("CARGO"));
     build.args(["build", "--quiet", "--workspace", "--bin", "wakescope"]);
     build.args(["--features", "wakescope-sim/mpi"]);
-    if args.measure {
+    if is_measured {
         build.args(["--example", "exchange_times"]);
     }
     call(&mut build)?;
@@ -67,7 +59,7 @@ pub(crate) fn run(args: &RanksArgs) -> Outcome {
     std::fs::write(scratch.join("long.toml"), CASE)?;
     compare(&program, &scratch)?;
     kill_one(&program, &scratch)?;
-    if !args.measure {
+    if !is_measured {
         return Ok(());
     }
     let cell_s = measure(&program, &scratch)?;
@@ -87,34 +79,20 @@ fn is_installed() -> bool {
     succeeds("[ $(id -u) = 0 ]") && succeeds(INSTALL) && succeeds(IS_THERE)
 }
 
-/// What a flow reports of its steps.
-struct Times {
-    steps_s: f64,
-    /// In turns and halos.
-    exchange_s: f64,
-}
-
-/// Runs the flow of the measurement on some ranks of one thread.
-fn flow_times(program: &Path, scratch: &Path, ranks: usize, out: &str) -> Result<Times, Failure> {
+/// Runs the flow of the measurement on some ranks of one thread; returns what it reports, as JSON.
+fn flow_report(program: &Path, scratch: &Path, ranks: usize, out: &str) -> Result<String, Failure> {
     let arguments = ["flow", "even.toml", "--quiet", "--json", "--threads", "1"];
     let mut flow = mpirun(ranks);
     flow.arg(program).args(arguments).args(["--out", out]);
-    let text = output(flow.current_dir(scratch))?;
-    let steps_s = json_number(&text, "steps_wall_s");
-    let exchange_s = json_number(&text, "exchange_wall_s");
-    let (Some(steps_s), Some(exchange_s)) = (steps_s, exchange_s) else {
-        return Err(Failure::new(format!("a flow reports no times: {text}")));
-    };
-    Ok(Times {
-        steps_s,
-        exchange_s,
-    })
+    output(flow.current_dir(scratch))
 }
 
 /// The first number of a key in a text of JSON.
-fn json_number(text: &str, key: &str) -> Option<f64> {
-    let (_, rest) = text.split_once(&format!("\"{key}\":"))?;
-    rest.split([',', '}']).next()?.trim().parse().ok()
+fn json_number(text: &str, key: &str) -> Result<f64, Failure> {
+    let after = text.split_once(&format!("\"{key}\":"));
+    after
+        .and_then(|(_, rest)| rest.split([',', '}']).next()?.trim().parse().ok())
+        .ok_or_else(|| Failure::new(format!("a flow reports no {key}: {text}")))
 }
 
 /// Prints how much less time steps need on two ranks of one thread than on one, and what they spend in turns and halos. A
@@ -128,15 +106,18 @@ fn measure(program: &Path, scratch: &Path) -> Result<f64, Failure> {
          pause_after_steps = {steps}\n[solver]\nsubgrid = {{ model = \"multiscale_wale\" }}\n[checkpoint]\nwrite = false\n"
     );
     std::fs::write(scratch.join("even.toml"), case)?;
-    let one = flow_times(program, scratch, 1, "even_one")?;
-    let two = flow_times(program, scratch, 2, "even_two")?;
+    let one = flow_report(program, scratch, 1, "even_one")?;
+    let two = flow_report(program, scratch, 2, "even_two")?;
+    let one_s = json_number(&one, "steps_wall_s")?;
+    let two_s = json_number(&two, "steps_wall_s")?;
+    let exchange_s = json_number(&two, "exchange_wall_s")?;
     println!(
         "measured, {cells}^3 with the multiscale model: two ranks of one thread are {:.2} times as fast as one; {:.0} % of a \
          step in turns and halos",
-        one.steps_s / two.steps_s,
-        100.0 * two.exchange_s / two.steps_s
+        one_s / two_s,
+        100.0 * exchange_s / two_s
     );
-    Ok(one.steps_s / f64::from(steps * stages * i32::pow(cells, 3)))
+    Ok(one_s / f64::from(steps * stages * i32::pow(cells, 3)))
 }
 
 /// A line of the example `exchange_times`: cells of a rank, bytes of a message and its time.

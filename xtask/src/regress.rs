@@ -7,26 +7,14 @@ use std::time::Instant;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_tests::curves::{ALL, Comparison, Curve};
 
-/// Options of the task.
-#[derive(Debug, clap::Args)]
-pub(crate) struct RegressArgs {
-    /// Compare only the curves whose name contains this.
-    #[arg(long, value_name = "WORD")]
-    only: Option<String>,
-}
-
 /// Compares all curves; on failure draws stored and computed curve over one another.
 ///
 /// # Errors
 /// When a curve is out of tolerance or cannot be read or computed.
-pub(crate) fn run(args: &RegressArgs) -> Outcome {
+pub(crate) fn run(only: Option<&str>) -> Outcome {
     let mut failed = Vec::new();
     for curve in &ALL {
-        if args
-            .only
-            .as_ref()
-            .is_some_and(|word| !curve.name.contains(word))
-        {
+        if only.is_some_and(|word| !curve.name.contains(word)) {
             continue;
         }
         let start = Instant::now();

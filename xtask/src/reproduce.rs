@@ -20,44 +20,30 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use wakescope_sim::io::{Table, write_atomic};
 
-/// Options of the task.
-#[derive(Debug, clap::Args)]
-pub(crate) struct ReproduceFigsArgs {
-    /// Numbers of the figures to draw, such as 1,5; the default is all.
-    #[arg(long, value_delimiter = ',', value_name = "LIST")]
-    only: Vec<u32>,
-    /// Folder to write to.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Threads to compute with; the default is one for each core. Results do not depend on it.
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    threads: usize,
-    #[command(flatten)]
-    context: Context,
-}
-
 /// Runs the task.
 ///
 /// # Errors
 /// Unknown figure, unusable output, or a figure that cannot be computed. A failed claim is no error.
-pub(crate) fn run(args: &ReproduceFigsArgs) -> Outcome {
-    let chosen = choose(&args.only)?;
-    let out = args
-        .out
-        .clone()
-        .unwrap_or_else(|| root().join("target/figures"));
+pub(crate) fn run(
+    only: &[u32],
+    out: Option<PathBuf>,
+    threads: usize,
+    context: &Context,
+) -> Outcome {
+    let chosen = choose(only)?;
+    let out = out.unwrap_or_else(|| root().join("target/figures"));
     std::fs::create_dir_all(&out)
         .map_err(|e| Failure::new(format!("cannot write to {}: {e}", out.display())))?;
     let start = Instant::now();
     let bar = progress_bar(chosen.len() as u64);
     let run = Run {
         chosen: &chosen,
-        context: &args.context,
-        threads: args.threads,
+        context,
+        threads,
         out: &out,
         bar: &bar,
     };
-    let mut done = if args.threads == 0 {
+    let mut done = if threads == 0 {
         run.draw_side_by_side()?
     } else {
         // No more threads than were requested.
@@ -68,7 +54,7 @@ pub(crate) fn run(args: &ReproduceFigsArgs) -> Outcome {
     done.extend(run.draw(Lane::Alone)?);
     done.sort_by_key(|(figure, _)| figures::ALL.iter().position(|of| of.id == figure.id));
     bar.finish_and_clear();
-    finish(&out, &args.context, &done, start.elapsed().as_secs_f64())
+    finish(&out, context, &done, start.elapsed().as_secs_f64())
 }
 
 /// Figures with what they gave.

@@ -14,36 +14,19 @@ use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_tests::extreme::{Ended, PARTS, Row, rows};
 
-/// Options of the task.
-#[derive(Debug, clap::Args)]
-pub(crate) struct StabilityArgs {
-    /// Quick leaves out what takes more than a few seconds.
-    #[arg(long, value_enum, default_value_t = Profile::Full)]
-    profile: Profile,
-    /// Only the cases whose name contains this.
-    #[arg(long, value_name = "WORD")]
-    only: Option<String>,
-    /// Folder to write to.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-}
-
 /// Runs the cases, prints and writes them.
 ///
 /// # Errors
 /// A case that did not end as it must, an unusable output.
-pub(crate) fn run(args: &StabilityArgs) -> Outcome {
+pub(crate) fn run(profile: Profile, only: Option<&str>, out: Option<PathBuf>) -> Outcome {
     let start = Instant::now();
     println!(
         "{:<8} {:<50} {:<7} {:>7}  {:<30} outcome",
         "crate", "case", "verdict", "time", "expected"
     );
     let rows = rows(|_, case| {
-        let is_named = args
-            .only
-            .as_ref()
-            .is_none_or(|word| case.name.contains(word));
-        let is_skipped = case.long && args.profile == Profile::Quick;
+        let is_named = only.is_none_or(|word| case.name.contains(word));
+        let is_skipped = case.long && profile == Profile::Quick;
         is_named && !is_skipped
     });
     for row in &rows {
@@ -57,11 +40,8 @@ pub(crate) fn run(args: &StabilityArgs) -> Outcome {
             row.ended.outcome
         );
     }
-    let folder = args
-        .out
-        .clone()
-        .unwrap_or_else(|| root().join("target/stability"));
-    let origin = provenance(&format!("profile = \"{}\"\n", args.profile.name()), 1);
+    let folder = out.unwrap_or_else(|| root().join("target/stability"));
+    let origin = provenance(&format!("profile = \"{}\"\n", profile.name()), 1);
     Rendered::new(&table(&rows), &picture(&rows), &origin)?
         .files_in(&folder, "stability")?
         .commit()?;

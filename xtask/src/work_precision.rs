@@ -18,31 +18,13 @@ use crate::workspace::{provenance, root};
 use cases::{CASES, Case};
 use fixtures::failure::{Failure, Outcome};
 use front::{cheapest, on_front};
-pub(crate) use report::picture;
-use report::text;
+pub(crate) use report::{picture, text};
 use std::path::PathBuf;
 use wakescope_sim::io::{Provenance, Table};
 
-/// Options of the task.
-#[derive(Debug, clap::Args)]
-pub(crate) struct WorkPrecisionArgs {
-    /// Group to measure; the default is all.
-    #[arg(long, value_parser = GROUPS.map(|group| group.0))]
-    group: Option<String>,
-    /// Folder to write to.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Few and coarse settings: a minute instead of many.
-    #[arg(long)]
-    quick: bool,
-    /// Print only the processor time of the kernel by which times of other machines are scaled.
-    #[arg(long)]
-    kernel: bool,
-}
-
 /// What is measured: the groups and the rows of each, few and coarse ones if asked.
 type Rows = fn(bool) -> Result<Vec<Row>, Failure>;
-const GROUPS: [(&str, Rows); 5] = [
+pub(crate) const GROUPS: [(&str, Rows); 5] = [
     ("optics", physics::optics),
     ("les", physics::les),
     ("signal", physics::signal),
@@ -222,7 +204,7 @@ pub(crate) fn table(rows: &[Row]) -> Table {
     table
 }
 
-fn provenance_of_run(quick: bool) -> Provenance {
+pub(crate) fn provenance_of_run(quick: bool) -> Provenance {
     let parameters = format!("machine = {:?}\nthreads = 1\nquick = {quick}\n", machine());
     provenance(&parameters, physics::SEED)
 }
@@ -248,22 +230,15 @@ fn print(rows: &[Row]) {
     }
 }
 
-/// Measures, prints and writes.
+/// Measures a group or all, prints and writes.
 ///
 /// # Errors
 /// Fails if a crate refuses a setting or the output cannot be written.
-pub(crate) fn run(args: &WorkPrecisionArgs) -> Outcome {
-    if args.kernel {
-        println!("{:.6}", physics::kernel_s()?);
-        return Ok(());
-    }
-    let rows = measure(args.group.as_deref(), args.quick)?;
+pub(crate) fn run(group: Option<&str>, out: Option<PathBuf>, quick: bool) -> Outcome {
+    let rows = measure(group, quick)?;
     print(&rows);
-    let origin = provenance_of_run(args.quick);
-    let folder = args
-        .out
-        .clone()
-        .unwrap_or_else(|| root().join("target/work-precision"));
+    let origin = provenance_of_run(quick);
+    let folder = out.unwrap_or_else(|| root().join("target/work-precision"));
     Rendered::new(&table(&rows), &picture(&rows), &origin)?
         .files_in(&folder, "work_precision")?
         .commit()?;
@@ -272,23 +247,11 @@ pub(crate) fn run(args: &WorkPrecisionArgs) -> Outcome {
     Ok(())
 }
 
-/// All settings for the page of the book.
-pub(crate) struct Page {
-    pub(crate) text: String,
-    pub(crate) csv: String,
-    pub(crate) svg: String,
-}
-
-/// Measures all settings for the page of the book.
+/// Prints the processor time of the kernel by which times of other machines are scaled.
 ///
 /// # Errors
-/// As [`run`].
-pub(crate) fn page() -> Result<Page, Failure> {
-    let rows = measure(None, false)?;
-    let origin = provenance_of_run(false);
-    Ok(Page {
-        text: text(&rows),
-        csv: table(&rows).to_csv(&origin)?,
-        svg: picture(&rows).svg(&origin)?,
-    })
+/// Fails if the solver refuses the kernel's case.
+pub(crate) fn print_kernel() -> Outcome {
+    println!("{:.6}", physics::kernel_s()?);
+    Ok(())
 }

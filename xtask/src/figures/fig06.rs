@@ -66,17 +66,15 @@ fn strongest_secondary(wake: &FinishedWake, side: &str) -> Result<(f64, f64), Fa
     Ok(strongest)
 }
 
-/// Energies of waves along the flight.
-struct Waves {
-    /// Against tau, by wave.
-    energies: Vec<Vec<(f64, f64)>>,
+/// The energy of several waves together at an age, from that of each against tau.
+fn energy_at(waves: &[Vec<(f64, f64)>], tau: f64) -> f64 {
+    waves.iter().map(|curve| value_at(curve, tau)).sum()
 }
 
-impl Waves {
-    /// The energy of all of them at an age.
-    fn energy(&self, tau: f64) -> f64 {
-        self.energies.iter().map(|curve| value_at(curve, tau)).sum()
-    }
+/// Fraction of the energy of short waves in that of all waves at an age.
+fn short_fraction(short: &[Vec<(f64, f64)>], others: &[Vec<(f64, f64)>], tau: f64) -> f64 {
+    let short = energy_at(short, tau);
+    short / (short + energy_at(others, tau))
 }
 
 /// Waves of 0.2 to 0.6 spacings together: their growth, half the slope of the logarithm of their energy, and their share of all waves.
@@ -84,33 +82,26 @@ fn short_waves(wake: &FinishedWake) -> Result<Claim, Failure> {
     let shortest = wake.flow.size[0] / 0.2;
     let longest = wake.flow.size[0] / 0.6;
     let mut modes = Vec::new();
-    let mut short = Waves {
-        energies: Vec::new(),
-    };
-    let mut others = Waves {
-        energies: Vec::new(),
-    };
+    let mut short = Vec::new();
+    let mut others = Vec::new();
     for mode in 1..=8 {
         let energy = wake.curve(&format!("energy_mode_{mode}"))?;
         if (longest..=shortest).contains(&f64::from(mode)) {
             modes.push(mode);
-            short.energies.push(energy);
+            short.push(energy);
         } else {
-            others.energies.push(energy);
+            others.push(energy);
         }
     }
-    let share = |tau: f64| short.energy(tau) / (short.energy(tau) + others.energy(tau));
-    let rate = 0.5 * (short.energy(2.0) / short.energy(1.0)).ln();
+    let [at_start, at_1, at_2] = [0.0, 1.0, 2.0].map(|tau| short_fraction(&short, &others, tau));
+    let rate = 0.5 * (energy_at(&short, 2.0) / energy_at(&short, 1.0)).ln();
     let first = modes.first().copied().unwrap_or(0);
     let last = modes.last().copied().unwrap_or(0);
     let measured = format!(
         "modes {first} to {last} of the box, all together, grow at {rate:.2} per tau from 1 to 2; of the energy of modes 1 to 8 they hold \
-         {:.2} at tau = 0, {:.2} at 1 and {:.2} at 2",
-        share(0.0),
-        share(1.0),
-        share(2.0)
+         {at_start:.2} at tau = 0, {at_1:.2} at 1 and {at_2:.2} at 2"
     );
-    let claim = Claim::exact("F6b", measured, rate > 1.0 && share(2.0) > 0.75);
+    let claim = Claim::exact("F6b", measured, rate > 1.0 && at_2 > 0.75);
     let is_resolved = wake.flow.cells[0] as f64 / f64::from(last.max(1)) >= 4.0;
     Ok(if is_resolved {
         claim

@@ -20,7 +20,7 @@ pub(super) fn make_13(context: &Context) -> Result<Rendered, Failure> {
         [[32; 2], [1280, 320]],
         [[96; 2], [1600, 400]],
     );
-    let (mut out, chapter) = compare(context, Panels::OneDuration, scans, |mut scene| {
+    let (mut out, chapter) = compare(context, 1, scans, |mut scene| {
         scene.estimator.gate_step_samples = context.profile.choose(10, 5, 5);
         scene
     })?;
@@ -46,7 +46,7 @@ pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
         context
             .profile
             .choose([[8; 2], [168; 2]], [[32; 2], [192; 2]], [[96; 2], [400; 2]]);
-    let (mut out, chapter) = compare(context, Panels::AllDurations, scans, |scene| {
+    let (mut out, chapter) = compare(context, DURATIONS_S.len(), scans, |scene| {
         with_turbulence(context, scene, 1e-15)
     })?;
     let peaks = profiles::parts(&chapter, " m/s", |p, without| {
@@ -75,18 +75,11 @@ struct Case {
     method: &'static str,
 }
 
-/// How many pulse durations share a panel.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Panels {
-    OneDuration,
-    AllDurations,
-}
-
 /// PA and CA on the same signals for both references and durations, in so many scans at each, for scenes about the cores that
-/// may be changed: the figure, and the profiles at the chapter's reference.
+/// may be changed: the figure, whose panels show one pulse duration each or all of them, and the profiles at the chapter's reference.
 fn compare(
     context: &Context,
-    panels: Panels,
+    durations_in_panel: usize,
     scans: [[usize; 2]; 2],
     change: impl Fn(Scene) -> Scene,
 ) -> Result<(Rendered, Vec<Profiles>), Failure> {
@@ -103,7 +96,7 @@ fn compare(
     let all = profiles_of(&cases, &studies)?;
     let shown = sight.scene(context, near_scene(scans[1][0]));
     let origin = context.provenance_of_formula(&shown.to_toml());
-    let figure = Figure::stacked(plots(panels, &all));
+    let figure = Figure::stacked(plots(durations_in_panel, &all));
     let mut out = Rendered::new(&profiles::table(&all), &figure, &origin)?;
     let named = all.iter().map(|p| (p.title(), p));
     let batches = profiles::batches_table(named, Gates::Included);
@@ -152,20 +145,17 @@ fn profiles_of(cases: &[Case], studies: &[Study]) -> Result<Vec<Profiles>, Failu
     Ok(all)
 }
 
-fn plots(panels: Panels, all: &[Profiles]) -> Vec<CurvePlot> {
-    let durations = match panels {
-        Panels::OneDuration => 1,
-        Panels::AllDurations => DURATIONS_S.len(),
-    };
+fn plots(durations_in_panel: usize, all: &[Profiles]) -> Vec<CurvePlot> {
     let mut plots = Vec::new();
-    for shown in all.chunks(durations * METHODS.len()) {
+    for shown in all.chunks(durations_in_panel * METHODS.len()) {
         let first = &shown[0];
-        let title = match panels {
-            Panels::OneDuration => first.title(),
-            Panels::AllDurations => format!(
+        let title = if durations_in_panel == 1 {
+            first.title()
+        } else {
+            format!(
                 "{} signal-to-noise ratio, {:.1} dB",
                 first.name, first.snr_db
-            ),
+            )
         };
         plots.push(profiles::plot(&title, shown));
     }

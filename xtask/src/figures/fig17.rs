@@ -49,37 +49,6 @@ impl Fits {
     }
 }
 
-/// How many scans there are, of how many the signals are fitted, and every how many samples maps have a gate.
-struct Samples {
-    scans: usize,
-    of_signals: usize,
-    gate_step: usize,
-}
-
-impl Samples {
-    /// Eight scans decide the claims on maps; of gates every 8 samples, which overlap, every third is taken in quick. Fits of
-    /// signals need the longest run time: the few that quick could make decide no claim on their scatter.
-    fn of(profile: Profile) -> Self {
-        match profile {
-            Profile::Quick => Self {
-                scans: BATCHES,
-                of_signals: 0,
-                gate_step: 24,
-            },
-            Profile::Standard => Self {
-                scans: 48,
-                of_signals: 12,
-                gate_step: 8,
-            },
-            Profile::Full => Self {
-                scans: 100,
-                of_signals: 100,
-                gate_step: 8,
-            },
-        }
-    }
-}
-
 /// One circulation and one core radius for both vortices.
 fn free() -> FreeParameters {
     FreeParameters {
@@ -89,7 +58,12 @@ fn free() -> FreeParameters {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let samples = Samples::of(context.profile);
+    // Eight scans decide the claims on maps; of gates every 8 samples, which overlap, every third is
+    // taken in quick. Fits of signals need the longest run time: the few that quick could make
+    // decide no claim on their scatter.
+    let scans = context.profile.choose(BATCHES, 48, 100);
+    let scans_of_signals = context.profile.choose(0, 12, 100);
+    let gate_step = context.profile.choose(24, 8, 8);
     let levels_db = context
         .profile
         .choose(vec![0.0], vec![0.0], vec![0.0, 10.0]);
@@ -97,16 +71,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut bounds = Vec::new();
     for &snr_db in &levels_db {
         let noise = NoiseModel::BandLimited;
-        let pair = PairScan::new(noise, 200e-9, snr_db, samples.gate_step, context.seed)?;
-        bounds.push(Bounds::new(&pair)?);
-        fits.extend(fits_of(&pair, snr_db, &samples)?);
+        let pair = PairScan::new(noise, 200e-9, snr_db, gate_step, context.seed)?;
+        bounds.push(bounds_m2_s(&pair)?);
+        fits.extend(fits_of(&pair, snr_db, scans, scans_of_signals)?);
     }
     let parameters = format!(
-        "profile = \"{}\"\nscans = {}\nscans_of_signals = {}\ngate_step_samples = {}\nsnr_db = {levels_db:?}\n",
-        context.profile.name(),
-        samples.scans,
-        samples.of_signals,
-        samples.gate_step
+        "profile = \"{}\"\nscans = {scans}\nscans_of_signals = {scans_of_signals}\ngate_step_samples = {gate_step}\nsnr_db = {levels_db:?}\n",
+        context.profile.name()
     );
     let origin = context.provenance_of_formula(&parameters);
     let by_flow = flows::all(context)?;
@@ -115,20 +86,25 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     panels.push(flows::picture(&by_flow));
     let tables = Table::stack(vec![table(&fits), flows::table(&by_flow)])?;
     let mut out = Rendered::new(&tables, &Figure::stacked(panels), &origin)?;
-    out.values = vec![RADIUS_M.to_string(), samples.of_signals.to_string()];
-    out.claims = claims(&first, &bounds[0]);
+    out.values = vec![RADIUS_M.to_string(), scans_of_signals.to_string()];
+    out.claims = claims(&first, bounds[0]);
     out.claims.extend(flows::claims(&by_flow));
     Ok(out)
 }
 
-/// The fits of all scans.
-fn fits_of(pair: &PairScan, snr_db: f64, samples: &Samples) -> Result<Vec<Fits>, Failure> {
-    (0..samples.scans)
+/// The fits of all scans, of the signals for the first ones alone.
+fn fits_of(
+    pair: &PairScan,
+    snr_db: f64,
+    scans: usize,
+    scans_of_signals: usize,
+) -> Result<Vec<Fits>, Failure> {
+    (0..scans)
         .into_par_iter()
         .map(|scan| {
             let trial = FitTrial::new(pair, scan)?;
             let mut by_method = fit_map(&trial);
-            if scan < samples.of_signals {
+            if scan < scans_of_signals {
                 let signals = fit_signals(&trial, by_method[0].as_ref());
                 by_method.extend(signals);
             }
@@ -178,20 +154,13 @@ fn fit_signals(trial: &FitTrial, start: Option<&Found>) -> [Option<Found>; 2] {
     })
 }
 
-/// Bounds on the common circulation \[m^2/s\].
-struct Bounds {
-    core_known_m2_s: f64,
-    core_fitted_m2_s: f64,
-}
-
-impl Bounds {
-    fn new(pair: &PairScan) -> Result<Self, Failure> {
-        let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth())?;
-        Ok(Self {
-            core_known_m2_s: bound_m2_s(&model, Sharing::Fixed)?,
-            core_fitted_m2_s: bound_m2_s(&model, Sharing::Common)?,
-        })
-    }
+/// Bounds on the common circulation \[m^2/s\] with the core known and with the core fitted.
+fn bounds_m2_s(pair: &PairScan) -> Result<[f64; 2], Failure> {
+    let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth())?;
+    Ok([
+        bound_m2_s(&model, Sharing::Fixed)?,
+        bound_m2_s(&model, Sharing::Common)?,
+    ])
 }
 
 fn bound_m2_s(model: &ScanModel, core_radius: Sharing) -> Result<f64, Failure> {
@@ -203,57 +172,45 @@ fn bound_m2_s(model: &ScanModel, core_radius: Sharing) -> Result<f64, Failure> {
     Ok(covariance[[Parameter::LeftCirculation as usize; 2]].sqrt())
 }
 
-/// A row of the table: one vortex of one fit.
-struct Row<'f> {
-    fits: &'f Fits,
-    method: usize,
-    vortex: Side,
-}
-
-impl Row<'_> {
-    /// Circulation and its standard deviation.
-    fn circulation_m2_s(&self) -> (f64, f64) {
-        self.fits
-            .parameter(self.method, self.vortex.parameters()[0])
-    }
-
-    /// Error and standard deviation of a coordinate: 1 lateral, 2 height.
-    fn coordinate_m(&self, coordinate: usize) -> (f64, f64) {
-        let parameter = self.vortex.parameters()[coordinate];
-        let (value, std) = self.fits.parameter(self.method, parameter);
-        (value - truth().to_array()[parameter as usize], std)
-    }
-}
-
+/// One row for each vortex of each fit; errors of the lateral position and of the height.
 fn table(fits: &[Fits]) -> Table {
-    let mut rows = Vec::new();
+    let true_wake = truth().to_array();
+    let mut scan = Vec::new();
+    let mut snr_db = Vec::new();
+    let mut methods = Vec::new();
+    let mut vortices = Vec::new();
+    let mut gamma = Vec::new();
+    let mut y = Vec::new();
+    let mut z = Vec::new();
     for fits in fits {
         for method in 0..fits.by_method.len() {
             for vortex in [Side::Left, Side::Right] {
-                rows.push(Row {
-                    fits,
-                    method,
-                    vortex,
-                });
+                scan.push(fits.scan as i64);
+                snr_db.push(fits.snr_db);
+                methods.push(METHODS[method]);
+                vortices.push(name(vortex));
+                let [circulation, lateral, height, _] = vortex.parameters();
+                gamma.push(fits.parameter(method, circulation));
+                let (lateral_m, std_m) = fits.parameter(method, lateral);
+                y.push((lateral_m - true_wake[lateral as usize], std_m));
+                let (height_m, std_m) = fits.parameter(method, height);
+                z.push((height_m - true_wake[height as usize], std_m));
             }
         }
     }
-    let gamma: Vec<(f64, f64)> = rows.iter().map(Row::circulation_m2_s).collect();
-    let y: Vec<(f64, f64)> = rows.iter().map(|row| row.coordinate_m(1)).collect();
-    let z: Vec<(f64, f64)> = rows.iter().map(|row| row.coordinate_m(2)).collect();
     Table::new()
-        .text("flow", column(&rows, |_| "analytic pair"))
-        .int("scan", column(&rows, |row| row.fits.scan as i64))
-        .text("method", column(&rows, |row| METHODS[row.method]))
-        .float("gamma_true_m2_s", column(&rows, |_| CIRCULATION_M2_S))
+        .text("flow", column(&scan, |_| "analytic pair"))
+        .int("scan", scan)
+        .text("method", methods)
+        .float("gamma_true_m2_s", column(&gamma, |_| CIRCULATION_M2_S))
         .float("gamma_m2_s", column(&gamma, |g| g.0))
         .float("gamma_std_m2_s", column(&gamma, |g| g.1))
         .float("y_error_m", column(&y, |y| y.0))
         .float("z_error_m", column(&z, |z| z.0))
-        .text("vortex", column(&rows, |row| name(row.vortex)))
+        .text("vortex", vortices)
         .float("y_std_m", column(&y, |y| y.1))
         .float("z_std_m", column(&z, |z| z.1))
-        .float("snr_db", column(&rows, |row| row.fits.snr_db))
+        .float("snr_db", snr_db)
 }
 
 fn pictures(fits: &[&Fits]) -> Vec<CurvePlot> {
@@ -330,7 +287,7 @@ fn deviation(numbers: &[f64]) -> Estimate {
     about_mean.times((n / (n - 1.0)).sqrt())
 }
 
-fn claims(fits: &[&Fits], bounds: &Bounds) -> Vec<Claim> {
+fn claims(fits: &[&Fits], [core_known_m2_s, core_fitted_m2_s]: [f64; 2]) -> Vec<Claim> {
     let map = errors(fits, 0);
     let resolved = errors(fits, 1);
     let known = errors(fits, 2);
@@ -339,8 +296,8 @@ fn claims(fits: &[&Fits], bounds: &Bounds) -> Vec<Claim> {
     let tried: usize = fits.iter().map(|f| f.by_method.len()).sum();
     let rms = Bar::Below(5.0);
     let over_bound = Bar::Below(1.5);
-    let known_over_bound = deviation(&known).times(bounds.core_known_m2_s.recip());
-    let fitted_over_bound = deviation(&fitted).times(bounds.core_fitted_m2_s.recip());
+    let known_over_bound = deviation(&known).times(core_known_m2_s.recip());
+    let fitted_over_bound = deviation(&fitted).times(core_fitted_m2_s.recip());
     let bias = Estimate::mean(&fitted);
     let bias = Estimate {
         value: bias.value.abs(),

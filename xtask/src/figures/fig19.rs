@@ -99,7 +99,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             });
         }
         if range_m == ALARM_RANGE_M {
-            alarmed = Some(Alarms::count(&plan, &noise, scans, rate)?);
+            alarmed = Some(alarms(&plan, &noise, scans, rate)?);
         }
     }
     let alarmed = alarmed.ok_or_else(|| Failure::new(format!("no scan at {ALARM_RANGE_M} m")))?;
@@ -118,39 +118,28 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         AIR.deviation_m_s.to_string(),
         AIR.length_m.to_string(),
     ];
-    out.claims = claims(&cases, &alarmed);
+    out.claims = claims(&cases, alarmed, rate);
     Ok(out)
 }
 
-/// Alarms in whole scans of still air, each with signals of its own, through the scene's estimator.
-struct Alarms {
-    share: Share,
-    /// The rate that was set.
-    rate: f64,
-    /// Its binomial standard error.
-    rate_error: f64,
-}
-
-impl Alarms {
-    fn count(plan: &Plan, noise: &SceneNoise, scans: usize, rate: f64) -> Result<Self, Failure> {
-        let settings = settings(plan, noise, None, rate)?;
-        let mut file = plan.scene.clone();
-        file.content.scan.realisations = scans;
-        let mut maps = Vec::new();
-        for velocity_m_s in velocities(&Plan::new(file, Target::Map)?, &Silent)? {
-            maps.push(ScanMap {
-                velocity_m_s,
-                ..noise.empty_scan(plan)
-            });
-        }
-        let (found, _) = detect(&maps, &settings, &Silent)?;
-        let alarms = found.iter().filter(|scan| scan.is_wake()).count();
-        Ok(Self {
-            share: Share::of(alarms, maps.len()),
-            rate,
-            rate_error: (rate * (1.0 - rate) / maps.len() as f64).sqrt(),
-        })
+/// Alarms in whole scans of still air, each with signals of its own, through the scene's estimator:
+/// their fraction, with the binomial standard error of the rate that was set.
+fn alarms(plan: &Plan, noise: &SceneNoise, scans: usize, rate: f64) -> Result<Estimate, Failure> {
+    let settings = settings(plan, noise, None, rate)?;
+    let mut file = plan.scene.clone();
+    file.content.scan.realisations = scans;
+    let mut maps = Vec::new();
+    for velocity_m_s in velocities(&Plan::new(file, Target::Map)?, &Silent)? {
+        maps.push(ScanMap {
+            velocity_m_s,
+            ..noise.empty_scan(plan)
+        });
     }
+    let (found, _) = detect(&maps, &settings, &Silent)?;
+    let alarms = found.iter().filter(|scan| scan.is_wake()).count();
+    let rate_error = (rate * (1.0 - rate) / maps.len() as f64).sqrt();
+    let share = Share::of(alarms, maps.len());
+    Ok(Estimate::stated(share.value, rate_error))
 }
 
 /// A row of the table: circulation, rate of false alarms, share found and its standard error.
@@ -273,17 +262,15 @@ fn farthest(numbers: impl Iterator<Item = f64>, from: f64) -> f64 {
     farthest
 }
 
-fn claims(cases: &[Case], alarms: &Alarms) -> Vec<Claim> {
+fn claims(cases: &[Case], alarmed: Estimate, rate: f64) -> Vec<Claim> {
     let ratios = cases
         .iter()
         .map(|c| c.power.smallest_m2_s.0 / c.power.smallest_m2_s.1);
     let worst = farthest(ratios, 1.0);
     let far = farthest(cases.iter().map(|c| c.power.gumbel.1), 2.0);
-    let rate = alarms.rate;
     // A test that would pass twice the rate tells nothing.
     let bar = Bar::Between(0.5 * rate, 2.0 * rate);
-    let share = Estimate::stated(alarms.share.value, alarms.rate_error);
-    let rates = Claim::judged_alone("F19c", share, "", bar);
+    let rates = Claim::judged_alone("F19c", alarmed, "", bar);
     vec![
         Claim::exact("F19a", format!("{worst:.3}"), (0.75..1.25).contains(&worst)),
         Claim::exact("F19b", format!("{far:.2}"), (1.6..2.5).contains(&far)),

@@ -43,9 +43,11 @@ enum ProfileName {
     LambOseen,
 }
 
-/// Pairs of vortices and their secondary vortices.
+/// Pairs of vortices and their secondary vortices; scenes with them have gates, noise and times of
+/// their own.
 #[derive(Deserialize)]
 struct WakeKind {
+    name: String,
     #[serde(with = "ProfileName")]
     profile: CoreProfile,
     /// Least and largest height of the vortices \[m\].
@@ -57,7 +59,6 @@ struct WakeKind {
 /// Maps of means over gates.
 #[derive(Deserialize)]
 struct MapKind {
-    name: String,
     #[serde(flatten)]
     wake: WakeKind,
     /// Whether the wakes have secondary vortices.
@@ -71,19 +72,11 @@ struct MapKind {
     duration_s: f64,
 }
 
-/// Scans of a scene, which has gates, noise and times of its own.
-#[derive(Deserialize)]
-struct SceneKind {
-    name: String,
-    #[serde(flatten)]
-    wake: WakeKind,
-}
-
 /// Kinds whose maps are drawn, and whose scenes are run.
 #[derive(Deserialize)]
 struct Kinds {
     map: Vec<MapKind>,
-    scene: Vec<SceneKind>,
+    scene: Vec<WakeKind>,
 }
 
 /// Errors of one fitted vortex.
@@ -154,59 +147,52 @@ impl Rule {
     }
 }
 
-/// Random numbers that are the same for one seed.
-struct Draw(Xoshiro256PlusPlus);
+/// A number between two, uniformly distributed.
+fn draw_within(rng: &mut Xoshiro256PlusPlus, [least, most]: [f64; 2]) -> f64 {
+    least + (most - least) * (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
 
-impl Draw {
-    fn new(seed: u64) -> Self {
-        Self(Xoshiro256PlusPlus::seed_from_u64(seed))
-    }
+/// A normally distributed number of variance 1.
+fn draw_normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    let radius = (-2.0 * (1.0 - draw_within(rng, [0.0, 1.0])).ln()).sqrt();
+    radius * (TAU * draw_within(rng, [0.0, 1.0])).cos()
+}
 
-    fn within(&mut self, [least, most]: [f64; 2]) -> f64 {
-        least + (most - least) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.within([0.0, 1.0])).ln()).sqrt();
-        radius * (TAU * self.within([0.0, 1.0])).cos()
-    }
-
-    /// A pair, and the secondary vortices that belong to it.
-    fn wake(&mut self, kind: &WakeKind) -> (Wake, [Vortex; 2]) {
-        let circulation_m2_s = self.within([250.0, 550.0]);
-        let spacing_m = self.within(kind.spacing_m);
-        let height_m = self.within(kind.height_m);
-        let core_radius_m = self.within([2.0, 4.5]);
-        let sides = [-1.0, 1.0].map(|side| {
-            let primary = Vortex {
-                circulation_m2_s: circulation_m2_s * self.within([0.9, 1.1]),
-                lateral_position_m: MIDDLE_M + 0.5 * side * spacing_m,
-                height_m: height_m * self.within([0.9, 1.1]),
-                core_radius_m,
-            };
-            let secondary = self.secondary(&primary, side);
-            (primary, secondary)
-        });
-        let [(left, left_secondary), (right, right_secondary)] = sides;
-        let wake = Wake {
-            left,
-            right,
-            lateral_wind_m_s: self.within([-4.0, 4.0]),
-            wind_shear_per_s: self.within([-0.02, 0.02]),
+/// A pair, and the secondary vortices that belong to it.
+fn draw_wake(rng: &mut Xoshiro256PlusPlus, kind: &WakeKind) -> (Wake, [Vortex; 2]) {
+    let circulation_m2_s = draw_within(rng, [250.0, 550.0]);
+    let spacing_m = draw_within(rng, kind.spacing_m);
+    let height_m = draw_within(rng, kind.height_m);
+    let core_radius_m = draw_within(rng, [2.0, 4.5]);
+    let sides = [-1.0, 1.0].map(|side| {
+        let primary = Vortex {
+            circulation_m2_s: circulation_m2_s * draw_within(rng, [0.9, 1.1]),
+            lateral_position_m: MIDDLE_M + 0.5 * side * spacing_m,
+            height_m: height_m * draw_within(rng, [0.9, 1.1]),
+            core_radius_m,
         };
-        (wake, [left_secondary, right_secondary])
-    }
+        let secondary = draw_secondary(rng, &primary, side);
+        (primary, secondary)
+    });
+    let [(left, left_secondary), (right, right_secondary)] = sides;
+    let wake = Wake {
+        left,
+        right,
+        lateral_wind_m_s: draw_within(rng, [-4.0, 4.0]),
+        wind_shear_per_s: draw_within(rng, [-0.02, 0.02]),
+    };
+    (wake, [left_secondary, right_secondary])
+}
 
-    /// The secondary vortex of a vortex: outside and above, as the ground makes it.
-    fn secondary(&mut self, primary: &Vortex, side: f64) -> Vortex {
-        let distance_m = primary.height_m * self.within([0.5, 1.1]);
-        let angle = self.within([0.0, 0.4 * PI]);
-        Vortex {
-            circulation_m2_s: -primary.circulation_m2_s * self.within([0.25, 0.45]),
-            lateral_position_m: primary.lateral_position_m + side * distance_m * angle.cos(),
-            height_m: primary.height_m + distance_m * angle.sin(),
-            core_radius_m: primary.height_m * self.within([0.08, 0.16]),
-        }
+/// The secondary vortex of a vortex: outside and above, as the ground makes it.
+fn draw_secondary(rng: &mut Xoshiro256PlusPlus, primary: &Vortex, side: f64) -> Vortex {
+    let distance_m = primary.height_m * draw_within(rng, [0.5, 1.1]);
+    let angle = draw_within(rng, [0.0, 0.4 * PI]);
+    Vortex {
+        circulation_m2_s: -primary.circulation_m2_s * draw_within(rng, [0.25, 0.45]),
+        lateral_position_m: primary.lateral_position_m + side * distance_m * angle.cos(),
+        height_m: primary.height_m + distance_m * angle.sin(),
+        core_radius_m: primary.height_m * draw_within(rng, [0.08, 0.16]),
     }
 }
 
@@ -255,8 +241,8 @@ fn empty_map(kind: &MapKind) -> ScanMap {
 
 /// One map, fitted as `retrieve` fits that of any instrument. Nothing where it does not show a pair.
 fn map_errors(kind: &MapKind, seed: u64) -> Result<Option<ScanErrors>, Failure> {
-    let mut draw = Draw::new(seed);
-    let (truth, secondary) = draw.wake(&kind.wake);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let (truth, secondary) = draw_wake(&mut rng, &kind.wake);
     let options = options_of(kind);
     let mut true_options = options.clone();
     true_options.model.profile = kind.wake.profile;
@@ -264,7 +250,7 @@ fn map_errors(kind: &MapKind, seed: u64) -> Result<Option<ScanErrors>, Failure> 
     let mut map = empty_map(kind);
     map.velocity_m_s = expected_velocities(&map, &true_options, &truth, kind.duration_s > 0.0)?;
     map.velocity_m_s
-        .mapv_inplace(|v| v + kind.noise_m_s * draw.normal());
+        .mapv_inplace(|v| v + kind.noise_m_s * draw_normal(&mut rng));
     let pair = fit_scan(&map, &options)?;
     let with_secondary = |secondary| {
         let options = RetrievalOptions {
@@ -364,7 +350,8 @@ fn row_errors(rows: &[RetrievalRow]) -> Vec<Errors> {
 
 /// A pair of a scene.
 fn pair_of_scene(kind: &WakeKind, seed: u64) -> Flow {
-    let (wake, _) = Draw::new(seed).wake(kind);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let (wake, _) = draw_wake(&mut rng, kind);
     Flow::VortexPair(VortexPair {
         circulation_m2_s: wake.left.circulation_m2_s,
         spacing_m: wake.spacing_m(),
@@ -420,10 +407,10 @@ fn run_pairs(args: &FitTrialsArgs) -> Outcome {
             .map(|scan| map_errors(kind, first_seed + u64::from(scan)))
             .collect::<Result<_, Failure>>()?;
         let scans: Vec<ScanErrors> = scans.into_iter().flatten().collect();
-        print(&kind.name, &scans);
+        print(&kind.wake.name, &scans);
     }
     for kind in &kinds.scene {
-        let flow = pair_of_scene(&kind.wake, args.seed);
+        let flow = pair_of_scene(kind, args.seed);
         print(&kind.name, &scene_errors(&flow, &root(), args)?);
     }
     Ok(())
