@@ -81,48 +81,38 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     Ok(out)
 }
 
-/// The cells about the vortices of a map.
-struct Near<'s> {
-    study: &'s Study,
-    cells: Vec<(usize, usize)>,
+/// The cells about the vortices of a map that have estimates.
+fn near_cells(study: &Study) -> Vec<(usize, usize)> {
+    let mut cells = study.cells(|d, _| d < NEAR_M);
+    cells.retain(|cell| study.map.v_mean_m_s[*cell].is_finite());
+    cells
 }
 
-impl<'s> Near<'s> {
-    fn new(study: &'s Study) -> Self {
-        let mut cells = study.cells(|d, _| d < NEAR_M);
-        cells.retain(|cell| study.map.v_mean_m_s[*cell].is_finite());
-        Self { study, cells }
-    }
+/// Mean estimate of a cell without one batch.
+fn mean_m_s(study: &Study, cell: (usize, usize), without: Option<usize>) -> f64 {
+    let error_m_s = study.over_scans(cell, without, |error| error);
+    study.map.v_pulse_m_s[cell] + error_m_s
+}
 
-    /// Mean estimate of a cell without one batch.
-    fn mean_m_s(&self, cell: (usize, usize), without: Option<usize>) -> f64 {
-        let error_m_s = self.study.over_scans(cell, without, |error| error);
-        self.study.map.v_pulse_m_s[cell] + error_m_s
-    }
+/// Largest absolute value of a field in some cells.
+fn extreme_m_s(cells: &[(usize, usize)], value_m_s: impl Fn((usize, usize)) -> f64) -> f64 {
+    cells
+        .iter()
+        .map(|cell| value_m_s(*cell).abs())
+        .fold(0.0, f64::max)
+}
 
-    /// Largest absolute value of a field.
-    fn extreme_m_s(&self, field: &Array2<f64>) -> f64 {
-        let values = self.cells.iter().map(|cell| field[*cell].abs());
-        values.fold(0.0, f64::max)
-    }
-
-    /// Largest absolute value of the mean estimates.
-    fn extreme_estimate_m_s(&self, without: Option<usize>) -> f64 {
-        let values = self
-            .cells
-            .iter()
-            .map(|cell| self.mean_m_s(*cell, without).abs());
-        values.fold(0.0, f64::max)
-    }
-
-    /// Root mean square difference of the mean estimates and a field.
-    fn distance_m_s(&self, field: &Array2<f64>, without: Option<usize>) -> f64 {
-        let squares = self
-            .cells
-            .iter()
-            .map(|cell| (self.mean_m_s(*cell, without) - field[*cell]).powi(2));
-        (squares.sum::<f64>() / self.cells.len() as f64).sqrt()
-    }
+/// Root mean square difference of the mean estimates of some cells and a field, without one batch.
+fn distance_m_s(
+    study: &Study,
+    cells: &[(usize, usize)],
+    field: &Array2<f64>,
+    without: Option<usize>,
+) -> f64 {
+    let squares = cells
+        .iter()
+        .map(|cell| (mean_m_s(study, *cell, without) - field[*cell]).powi(2));
+    (squares.sum::<f64>() / cells.len() as f64).sqrt()
 }
 
 /// Of a map, how far its largest estimate is from the largest exact velocity, and how much nearer its estimates are to the pulse-weighted
@@ -130,14 +120,14 @@ impl<'s> Near<'s> {
 fn measure(study: &Study) -> (String, Vec<Part>) {
     let pulse = &study.map.v_pulse_m_s;
     let exact = &study.map.v_exact_m_s;
-    let near = Near::new(study);
-    let most_pulse = near.extreme_m_s(pulse);
-    let most_exact = near.extreme_m_s(exact);
+    let cells = near_cells(study);
+    let most_pulse = extreme_m_s(&cells, |cell| pulse[cell]);
+    let most_exact = extreme_m_s(&cells, |cell| exact[cell]);
     let weaker = Estimate::of(BATCHES, |without| {
-        near.extreme_estimate_m_s(without) - most_exact
+        extreme_m_s(&cells, |cell| mean_m_s(study, cell, without)) - most_exact
     });
     let closer = Estimate::of(BATCHES, |without| {
-        near.distance_m_s(pulse, without) - near.distance_m_s(exact, without)
+        distance_m_s(study, &cells, pulse, without) - distance_m_s(study, &cells, exact, without)
     });
     let words = format!(
         "extremes {} m/s beyond {most_exact:.2} exact, {most_pulse:.2} pulse-weighted; distances differ by {} m/s",

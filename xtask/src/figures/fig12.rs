@@ -34,51 +34,27 @@ fn scene(context: &Context, scans: usize) -> Scene {
     with_turbulence(context, with_method(early_scene(scans), METHODS[2]), 1e-13)
 }
 
-/// What is simulated for one curve.
-struct Case {
-    reference: &'static str,
-    snr: SnrReference,
-    scans: usize,
-    energy_j: f64,
-    /// Backscatter over that of the scene.
-    air: f64,
-}
-
-impl Case {
-    fn scene(&self, context: &Context) -> Scene {
-        let mut scene = scene(context, self.scans);
-        scene.detector.snr = self.snr;
-        scene.pulse.energy_j = self.energy_j;
-        scene.atmosphere.backscatter_per_m_sr *= self.air;
-        scene
-    }
-}
-
-/// All energies at both references, in so many scans at each, then the thin air.
-fn cases(scans: [usize; 2]) -> Vec<Case> {
-    let mut cases = Vec::new();
+/// The scenes of all curves with their references: all energies at both references, in so many
+/// scans at each, then the thin air.
+fn scenes(context: &Context, scans: [usize; 2]) -> Vec<(&'static str, Scene)> {
+    let mut scenes = Vec::new();
     for ((reference, snr), scans) in REFERENCES.into_iter().zip(scans) {
         for energy_j in ENERGIES_J {
-            cases.push(Case {
-                reference,
-                snr,
-                scans,
-                energy_j,
-                air: 1.0,
-            });
+            let mut scene = scene(context, scans);
+            scene.detector.snr = snr;
+            scene.pulse.energy_j = energy_j;
+            scenes.push((reference, scene));
         }
     }
-    cases.push(Case {
-        reference: THIN,
-        snr: REFERENCES[0].1,
-        scans: scans[0],
-        energy_j: 2.0 * AS_THIN_J,
-        air: 0.5,
-    });
-    cases
+    let mut thin = scene(context, scans[0]);
+    thin.detector.snr = REFERENCES[0].1;
+    thin.pulse.energy_j = 2.0 * AS_THIN_J;
+    thin.atmosphere.backscatter_per_m_sr *= 0.5;
+    scenes.push((THIN, thin));
+    scenes
 }
 
-fn curve(study: &Study, case: &Case) -> Curve {
+fn curve(study: &Study, reference: &'static str) -> Curve {
     let map = &study.map;
     let gates = map.range_m.len();
     let mut over_lines = Vec::new();
@@ -95,8 +71,8 @@ fn curve(study: &Study, case: &Case) -> Curve {
     let near = study.cells(|d, j| d > OUTSIDE_M && j < gates / 2);
     let far = study.cells(|d, j| d > OUTSIDE_M && j >= gates / 2);
     Curve {
-        reference: case.reference,
-        energy_j: case.energy_j,
+        reference,
+        energy_j: study.plan.scene.content.pulse.energy_j,
         over_lines,
         mean_of_lines_m_s,
         inside: study.zone(&study.cells(|d, _| d < INSIDE_M)),
@@ -109,12 +85,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let sight = Sight::of(context, EARLY_TAU)?;
     // Claims are judged at the chapter's reference.
     let scans = context.profile.choose([8, 48], [24, 96], [104, 104]);
-    let cases = cases(scans);
-    let scenes = cases.iter().map(|case| case.scene(context)).collect();
+    let (references, scenes): (Vec<_>, Vec<_>) = self::scenes(context, scans).into_iter().unzip();
     let studies = Study::runs(context, &sight, scenes)?;
     let mut all = Vec::new();
-    for (study, case) in studies.iter().zip(&cases) {
-        all.push(curve(study, case));
+    for (study, reference) in studies.iter().zip(references) {
+        all.push(curve(study, reference));
     }
     let (curves, thin) = all.split_at(all.len() - 1);
     let shown = sight.scene(context, scene(context, scans[1]));

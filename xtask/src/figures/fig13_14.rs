@@ -2,9 +2,9 @@
 //! with Cn2 = 1e-15.
 
 use super::context::*;
-use super::profiles::{self, Gates, Profiles};
+use super::profiles::{self, Profiles};
 use super::study::{
-    EARLY_TAU, METHODS, REFERENCES, Sight, Study, near_scene, with_method, with_turbulence,
+    EARLY_TAU, METHODS, REFERENCES, Sight, Study, batches, near_scene, with_method, with_turbulence,
 };
 use wakescope_sim::scene::PulseShape;
 
@@ -66,15 +66,6 @@ pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
     Ok(out)
 }
 
-/// What is simulated for one method.
-struct Case {
-    reference: &'static str,
-    snr: SnrReference,
-    scans: usize,
-    duration_s: f64,
-    method: &'static str,
-}
-
 /// PA and CA on the same signals for both references and durations, in so many scans at each, for scenes about the cores that
 /// may be changed: the figure, whose panels show one pulse duration each or all of them, and the profiles at the chapter's reference.
 fn compare(
@@ -84,23 +75,31 @@ fn compare(
     change: impl Fn(Scene) -> Scene,
 ) -> Result<(Rendered, Vec<Profiles>), Failure> {
     let sight = Sight::of(context, EARLY_TAU)?;
-    let cases = cases(scans);
+    let mut references = Vec::new();
     let mut scenes = Vec::new();
-    for case in &cases {
-        let mut scene = with_method(near_scene(case.scans), case.method);
-        scene.detector.snr = case.snr;
-        scene.pulse.shape = PulseShape::gaussian(case.duration_s);
-        scenes.push(change(scene));
+    for ((reference, snr), scans) in REFERENCES.into_iter().zip(scans) {
+        for (duration_s, scans) in DURATIONS_S.into_iter().zip(scans) {
+            references.push(reference);
+            for method in METHODS {
+                let mut scene = with_method(near_scene(scans), method);
+                scene.detector.snr = snr;
+                scene.pulse.shape = PulseShape::gaussian(duration_s);
+                scenes.push(change(scene));
+            }
+        }
     }
     let studies = Study::runs(context, &sight, scenes)?;
-    let all = profiles_of(&cases, &studies)?;
+    let all = profiles_of(&references, &studies)?;
     let shown = sight.scene(context, near_scene(scans[1][0]));
     let origin = context.provenance_of_formula(&shown.to_toml());
     let figure = Figure::stacked(plots(durations_in_panel, &all));
     let mut out = Rendered::new(&profiles::table(&all), &figure, &origin)?;
-    let named = all.iter().map(|p| (p.title(), p));
-    let batches = profiles::batches_table(named, Gates::Included);
-    out.add("batches.csv", &batches, &origin)?;
+    let mut zones = Vec::new();
+    for p in &all {
+        zones.extend(p.regions(&p.title()));
+        zones.extend(p.gates(&p.title()));
+    }
+    out.add("batches.csv", &batches(&zones), &origin)?;
     let [[few, _], [short, long]] = scans;
     let many = if short == long {
         short.to_string()
@@ -113,33 +112,14 @@ fn compare(
     Ok((out, chapter))
 }
 
-/// All methods for both references and durations.
-fn cases(scans: [[usize; 2]; 2]) -> Vec<Case> {
-    let mut cases = Vec::new();
-    for ((reference, snr), scans) in REFERENCES.into_iter().zip(scans) {
-        for (duration_s, scans) in DURATIONS_S.into_iter().zip(scans) {
-            for method in METHODS {
-                cases.push(Case {
-                    reference,
-                    snr,
-                    scans,
-                    duration_s,
-                    method,
-                });
-            }
-        }
-    }
-    cases
-}
-
-/// The errors of each case; methods on the same signals have the same ratio.
-fn profiles_of(cases: &[Case], studies: &[Study]) -> Result<Vec<Profiles>, Failure> {
+/// The errors of all methods for each reference and duration; methods on the same signals have the
+/// same ratio.
+fn profiles_of(references: &[&'static str], studies: &[Study]) -> Result<Vec<Profiles>, Failure> {
     let mut all = Vec::new();
-    let cases = cases.chunks(METHODS.len());
-    for (cases, studies) in cases.zip(studies.chunks(METHODS.len())) {
+    for (reference, studies) in references.iter().zip(studies.chunks(METHODS.len())) {
         let snr_db = profiles::snr_db(&studies[0])?;
-        for (case, study) in cases.iter().zip(studies) {
-            all.push(Profiles::of(case.method, case.reference, snr_db, study));
+        for (method, study) in METHODS.into_iter().zip(studies) {
+            all.push(Profiles::of(method, reference, snr_db, study));
         }
     }
     Ok(all)

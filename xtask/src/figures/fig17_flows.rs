@@ -152,28 +152,17 @@ pub(crate) fn retrieved(
         .rows)
 }
 
-/// A row of the table, with the flow and the name of its method.
-struct Row<'f> {
-    flow: &'f OfFlow,
-    method: &'static str,
-    row: &'f RetrievalRow,
-}
-
-impl Row<'_> {
-    /// A number of the vortex that was found; NaN of one that was not.
-    fn found(&self, number: impl Fn(&VortexResult) -> f64) -> f64 {
-        self.row.found.as_ref().map_or(f64::NAN, number)
-    }
+/// A number of the vortex that was found; NaN of one that was not.
+fn found(row: &RetrievalRow, number: impl Fn(&VortexResult) -> f64) -> f64 {
+    row.found.as_ref().map_or(f64::NAN, number)
 }
 
 /// Rows as those of the first part; positions have no standard deviation where the method reports none.
 pub(super) fn table(flows: &[OfFlow]) -> Table {
-    let mut rows = Vec::new();
-    for flow in flows {
-        for (method, row) in &flow.rows {
-            rows.push(Row { flow, method, row });
-        }
-    }
+    let mut flow_name = Vec::new();
+    let mut scan = Vec::new();
+    let mut snr_db = Vec::new();
+    let mut methods = Vec::new();
     let mut gamma_true = Vec::new();
     let mut gamma = Vec::new();
     let mut gamma_std = Vec::new();
@@ -181,31 +170,38 @@ pub(super) fn table(flows: &[OfFlow]) -> Table {
     let mut y_std = Vec::new();
     let mut z_error = Vec::new();
     let mut z_std = Vec::new();
-    for row in &rows {
-        let truth = &row.row.truth;
-        let true_y_m = truth.lateral_position_m.value;
-        let true_z_m = truth.height_m.value;
-        gamma_true.push(truth.circulation_5_15_m2_s.value);
-        gamma.push(row.found(|v| v.circulation_5_15_m2_s.value));
-        gamma_std.push(row.found(|v| v.circulation_5_15_m2_s.std));
-        y_error.push(row.found(|v| v.lateral_position_m.value - true_y_m));
-        y_std.push(row.found(|v| v.lateral_position_m.std));
-        z_error.push(row.found(|v| v.height_m.value - true_z_m));
-        z_std.push(row.found(|v| v.height_m.std));
+    let mut vortex = Vec::new();
+    for flow in flows {
+        for (method, row) in &flow.rows {
+            let true_y_m = row.truth.lateral_position_m.value;
+            let true_z_m = row.truth.height_m.value;
+            flow_name.push(flow.name());
+            scan.push(row.realisation as i64);
+            snr_db.push(SNR_DB);
+            methods.push(*method);
+            gamma_true.push(row.truth.circulation_5_15_m2_s.value);
+            gamma.push(found(row, |v| v.circulation_5_15_m2_s.value));
+            gamma_std.push(found(row, |v| v.circulation_5_15_m2_s.std));
+            y_error.push(found(row, |v| v.lateral_position_m.value - true_y_m));
+            y_std.push(found(row, |v| v.lateral_position_m.std));
+            z_error.push(found(row, |v| v.height_m.value - true_z_m));
+            z_std.push(found(row, |v| v.height_m.std));
+            vortex.push(name(row.truth.side));
+        }
     }
     Table::new()
-        .text("flow", column(&rows, |row| row.flow.name()))
-        .int("scan", column(&rows, |row| row.row.realisation as i64))
-        .text("method", column(&rows, |row| row.method))
+        .text("flow", flow_name)
+        .int("scan", scan)
+        .text("method", methods)
         .float("gamma_true_m2_s", gamma_true)
         .float("gamma_m2_s", gamma)
         .float("gamma_std_m2_s", gamma_std)
         .float("y_error_m", y_error)
         .float("z_error_m", z_error)
-        .text("vortex", column(&rows, |row| name(row.row.truth.side)))
+        .text("vortex", vortex)
         .float("y_std_m", y_std)
         .float("z_std_m", z_std)
-        .float("snr_db", column(&rows, |_| SNR_DB))
+        .float("snr_db", snr_db)
 }
 
 /// Errors of the circulations over 5 to 15 m by age, the pair at 0.

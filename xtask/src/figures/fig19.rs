@@ -142,61 +142,52 @@ fn alarms(plan: &Plan, noise: &SceneNoise, scans: usize, rate: f64) -> Result<Es
     Ok(Estimate::stated(share.value, rate_error))
 }
 
-/// A row of the table: circulation, rate of false alarms, share found and its standard error.
-struct Row<'c> {
-    case: &'c Case,
-    gamma_m2_s: f64,
-    false_alarm: f64,
-    detection: f64,
-    standard_error: f64,
-}
-
 /// Rows of operating curves, of shares at the rate, and of the smallest circulation.
 fn table(cases: &[Case]) -> Table {
-    let mut rows = Vec::new();
+    let mut of_row = Vec::new();
+    let mut gamma_m2_s = Vec::new();
+    let mut false_alarm = Vec::new();
+    let mut shares = Vec::new();
     for case in cases {
-        for (gamma_m2_s, false_alarm, _, share) in &case.power.roc {
-            rows.push(Row {
-                case,
-                gamma_m2_s: *gamma_m2_s,
-                false_alarm: *false_alarm,
-                detection: share.value,
-                standard_error: share.standard_error,
-            });
+        for (circulation_m2_s, rate, _, share) in &case.power.roc {
+            of_row.push(case);
+            gamma_m2_s.push(*circulation_m2_s);
+            false_alarm.push(*rate);
+            shares.push(*share);
         }
-        for (gamma_m2_s, _, _, share) in &case.power.found {
-            rows.push(Row {
-                case,
-                gamma_m2_s: *gamma_m2_s,
-                false_alarm: FALSE_ALARM,
-                detection: share.value,
-                standard_error: share.standard_error,
-            });
+        for (circulation_m2_s, _, _, share) in &case.power.found {
+            of_row.push(case);
+            gamma_m2_s.push(*circulation_m2_s);
+            false_alarm.push(FALSE_ALARM);
+            shares.push(*share);
         }
-        rows.push(Row {
-            case,
-            gamma_m2_s: case.power.smallest_m2_s.0,
-            false_alarm: FALSE_ALARM,
-            detection: 0.9,
+        of_row.push(case);
+        gamma_m2_s.push(case.power.smallest_m2_s.0);
+        false_alarm.push(FALSE_ALARM);
+        shares.push(Share {
+            value: 0.9,
             standard_error: f64::NAN,
         });
     }
     Table::new()
-        .text("background", column(&rows, |row| row.case.background))
-        .text("method", column(&rows, |_| "map"))
-        .float("range_m", column(&rows, |row| row.case.range_m))
-        .float("snr_db", column(&rows, |row| row.case.snr_db))
-        .float("gamma_m2_s", column(&rows, |row| row.gamma_m2_s))
-        .float("false_alarm", column(&rows, |row| row.false_alarm))
-        .float("detection", column(&rows, |row| row.detection))
-        .float("standard_error", column(&rows, |row| row.standard_error))
+        .text("background", column(&of_row, |case| case.background))
+        .text("method", column(&of_row, |_| "map"))
+        .float("range_m", column(&of_row, |case| case.range_m))
+        .float("snr_db", column(&of_row, |case| case.snr_db))
+        .float("gamma_m2_s", gamma_m2_s)
+        .float("false_alarm", false_alarm)
+        .float("detection", column(&shares, |share| share.value))
+        .float(
+            "standard_error",
+            column(&shares, |share| share.standard_error),
+        )
         .float(
             "sigma_gamma_m2_s",
-            column(&rows, |row| row.case.power.circulation_std_m2_s),
+            column(&of_row, |case| case.power.circulation_std_m2_s),
         )
         .float(
             "smallest_foretold_m2_s",
-            column(&rows, |row| row.case.power.smallest_m2_s.1),
+            column(&of_row, |case| case.power.smallest_m2_s.1),
         )
 }
 

@@ -1,8 +1,8 @@
 //! Figure 25, beyond the chapter: where correlogram accumulation errs less than periodogram accumulation, and where not.
 
 use super::context::*;
-use super::profiles::{self, Gates, Profiles};
-use super::study::{EARLY_TAU, METHODS, Sight, Study, Zone, near_scene, with_method};
+use super::profiles::Profiles;
+use super::study::{EARLY_TAU, METHODS, Sight, Study, Zone, batches, near_scene, with_method};
 use crate::statistics::NO_DIFFERENCE;
 use crate::wakes;
 use wakescope_sim::scene::{NoiseModel, Refinement, VortexPair};
@@ -155,26 +155,14 @@ impl Case {
 }
 
 /// Where errors are compared.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Region {
-    Inside,
-    Outside,
+type Region = fn(&Profiles) -> &Zone;
+
+fn inside(profiles: &Profiles) -> &Zone {
+    &profiles.inside
 }
 
-impl Region {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Inside => "inside",
-            Self::Outside => "outside",
-        }
-    }
-
-    fn zone(self, profiles: &Profiles) -> &Zone {
-        match self {
-            Self::Inside => &profiles.inside,
-            Self::Outside => &profiles.outside,
-        }
-    }
+fn outside(profiles: &Profiles) -> &Zone {
+    &profiles.outside
 }
 
 /// A case and the errors of its methods.
@@ -186,7 +174,7 @@ struct Measured {
 impl Measured {
     /// CA less PA, without or with the Gaussian weighting, over PA.
     fn share(&self, pa: usize, region: Region) -> Estimate {
-        region.zone(&self.of[2]).over(region.zone(&self.of[pa]))
+        region(&self.of[2]).over(region(&self.of[pa]))
     }
 
     /// The error of CA inside over that of unweighted PA, without one batch.
@@ -214,14 +202,14 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let shown = sight.scene(context, near_scene(scans));
     let origin = context.provenance_of_formula(&shown.to_toml());
     let mut out = Rendered::new(&table(&all), &picture(&all), &origin)?;
-    let mut named = Vec::new();
+    let mut zones = Vec::new();
     for m in &all {
+        let case = format!("{}; {} dB", m.case.name(), m.case.snr_db);
         for p in &m.of {
-            named.push((format!("{}; {} dB", m.case.name(), m.case.snr_db), p));
+            zones.extend(p.regions(&case));
         }
     }
-    let batches = profiles::batches_table(named.into_iter(), Gates::Omitted);
-    out.add("batches.csv", &batches, &origin)?;
+    out.add("batches.csv", &batches(&zones), &origin)?;
     out.values = vec![scans.to_string(), sight.words];
     out.marks = vec![sight.mark, "analytic pair".into()];
     out.words = words(&all)?;
@@ -254,50 +242,39 @@ fn measured(
     Ok(all)
 }
 
-/// A row of the table.
-struct Row<'m> {
-    measured: &'m Measured,
-    /// Which PA, as in [`METHODS`].
-    pa: usize,
-    region: Region,
-}
-
-impl Row<'_> {
-    fn rms_m_s(&self, method: usize) -> f64 {
-        self.region.zone(&self.measured.of[method]).rms_m_s(None)
-    }
-
-    fn share(&self) -> Estimate {
-        self.measured.share(self.pa, self.region)
-    }
-}
-
+/// One row for each case, region and PA.
 fn table(all: &[Measured]) -> Table {
-    let mut rows = Vec::new();
+    let regions: [(&str, Region); 2] = [("inside", inside), ("outside", outside)];
+    let mut cases = Vec::new();
+    let mut zones = Vec::new();
+    let mut against = Vec::new();
+    let mut rms_pa_m_s = Vec::new();
+    let mut rms_ca_m_s = Vec::new();
+    let mut shares = Vec::new();
     for measured in all {
-        for region in [Region::Inside, Region::Outside] {
+        for (name, region) in regions {
             for pa in [0, 1] {
-                rows.push(Row {
-                    measured,
-                    pa,
-                    region,
-                });
+                cases.push(&measured.case);
+                zones.push(name);
+                against.push(METHODS[pa]);
+                rms_pa_m_s.push(region(&measured.of[pa]).rms_m_s(None));
+                rms_ca_m_s.push(region(&measured.of[2]).rms_m_s(None));
+                shares.push(measured.share(pa, region));
             }
         }
     }
-    let cases: Vec<&Case> = rows.iter().map(|row| &row.measured.case).collect();
     Table::new()
         .text("case", column(&cases, |case| case.name()))
         .float("snr_db", column(&cases, |case| case.snr_db))
         .float("core_b0", column(&cases, |case| case.core_b0()))
-        .text("zone", column(&rows, |row| row.region.name()))
-        .text("against", column(&rows, |row| METHODS[row.pa]))
-        .float("rms_pa_m_s", column(&rows, |row| row.rms_m_s(row.pa)))
-        .float("rms_ca_m_s", column(&rows, |row| row.rms_m_s(2)))
-        .float("share", column(&rows, |row| row.share().value))
+        .text("zone", zones)
+        .text("against", against)
+        .float("rms_pa_m_s", rms_pa_m_s)
+        .float("rms_ca_m_s", rms_ca_m_s)
+        .float("share", column(&shares, |share| share.value))
         .float(
             "standard_error",
-            column(&rows, |row| row.share().standard_error),
+            column(&shares, |share| share.standard_error),
         )
 }
 
@@ -320,12 +297,12 @@ fn picture(all: &[Measured]) -> Figure {
     let cores = [("pair, band noise, one pulse a line".into(), cores)];
     let by_snr = |case: &Case| case.snr_db;
     let x = "SNR [dB]";
-    let inside = panel("Inside the vortices", x, Region::Inside, by_snr, &along);
-    let outside = panel("Outside", x, Region::Outside, by_snr, &along);
+    let in_vortices = panel("Inside the vortices", x, inside, by_snr, &along);
+    let beyond = panel("Outside", x, outside, by_snr, &along);
     let title = format!("Inside the vortices of the pair, {CHAPTER_DB} dB");
     let x = "core radius [b₀]";
-    let by_core = panel(&title, x, Region::Inside, Case::core_b0, &cores);
-    Figure::stacked([inside, outside, by_core])
+    let by_core = panel(&title, x, inside, Case::core_b0, &cores);
+    Figure::stacked([in_vortices, beyond, by_core])
 }
 
 /// CA less each PA over the latter, against a number of the cases.
@@ -365,7 +342,7 @@ fn find(all: &[Measured], case: Case) -> Result<&Measured, Failure> {
 
 /// How much less CA errs than unweighted PA inside in a case, in per cent.
 fn per_cent(all: &[Measured], case: Case) -> Result<String, Failure> {
-    let share = find(all, case)?.share(0, Region::Inside);
+    let share = find(all, case)?.share(0, inside);
     Ok(format!("{} %", share.times(100.0).words()))
 }
 
@@ -376,7 +353,7 @@ fn words(all: &[Measured]) -> Result<String, Failure> {
         if at(m.case, CHAPTER_DB) != WAKE {
             continue;
         }
-        let share = m.share(0, Region::Inside);
+        let share = m.share(0, inside);
         let verdict = match Bar::Less(NO_DIFFERENCE).verdict(&share) {
             Verdict::Pass => "less",
             Verdict::Fail => "not less",
@@ -446,26 +423,26 @@ fn claims(all: &[Measured]) -> Result<Vec<Claim>, Failure> {
     let bins = Case { bins: true, ..WAKE };
     let many = Case { pulses: 8, ..weak };
     let turned = [
-        part(all, strong, 0, Region::Inside, above)?,
-        part(all, strong_pair, 0, Region::Inside, above)?,
+        part(all, strong, 0, inside, above)?,
+        part(all, strong_pair, 0, inside, above)?,
     ];
-    let outside = [
-        part(all, WAKE, 0, Region::Outside, less)?,
-        part(all, PAIR, 0, Region::Outside, less)?,
+    let around = [
+        part(all, WAKE, 0, outside, less)?,
+        part(all, PAIR, 0, outside, less)?,
     ];
     let raw_bins = [
-        part(all, bins, 0, Region::Inside, less)?,
-        part(all, bins, 1, Region::Inside, less)?,
+        part(all, bins, 0, inside, less)?,
+        part(all, bins, 1, inside, less)?,
     ];
     let eight_pulses = [
-        part(all, many, 0, Region::Inside, above)?,
-        part(all, many, 1, Region::Inside, above)?,
+        part(all, many, 0, inside, above)?,
+        part(all, many, 1, inside, above)?,
     ];
     Ok(vec![
         Claim::judged("CP1", &smaller_ratio(all, white, weak)?),
         Claim::judged("CP2", &turned),
         Claim::judged("CP3", &smaller_ratio(all, pair(CORES[3]), PAIR)?),
-        Claim::judged("CP4", &outside),
+        Claim::judged("CP4", &around),
         Claim::judged("CP5", &raw_bins),
         Claim::judged("CP6", &eight_pulses),
     ])

@@ -5,7 +5,7 @@
 //! estimates, which is taken away.
 
 use super::context::*;
-use super::study::{INSIDE_M, METHODS, NamedZone, OUTSIDE_M, Study, Zone, batches};
+use super::study::{INSIDE_M, METHODS, NamedZone, OUTSIDE_M, Study, Zone};
 use crate::statistics::NO_DIFFERENCE;
 use wakescope_sim::measure::cell_average::CellAverage;
 
@@ -105,6 +105,28 @@ impl Profiles {
             .iter()
             .map(|(range_m, zone)| (*range_m, self.excess_m_s(zone, without)))
             .collect()
+    }
+
+    /// The zones of a named case that claims are about.
+    pub(super) fn regions(&self, case: &str) -> [NamedZone<'_>; 2] {
+        let case = format!("{}; {case}", self.method);
+        [
+            NamedZone::new(&case, "inside", f64::NAN, &self.inside),
+            NamedZone::new(&case, "outside", f64::NAN, &self.outside),
+        ]
+    }
+
+    /// The zones of a named case gate by gate.
+    pub(super) fn gates(&self, case: &str) -> Vec<NamedZone<'_>> {
+        let case = format!("{}; {case}", self.method);
+        let mut zones = Vec::new();
+        for zone in &self.evolution {
+            zones.push(NamedZone::new(&case, "evolution", zone.range_m, zone));
+        }
+        for (range_m, zone) in &self.across {
+            zones.push(NamedZone::new(&case, "across", *range_m, zone));
+        }
+        zones
     }
 
     /// How far it is from another method on the same signals in a number that both have.
@@ -244,36 +266,6 @@ pub(super) fn table(all: &[Profiles]) -> Table {
             "rms_less_evolution_m_s",
             column(&rows, |(p, _, zone)| p.excess_m_s(zone, None)),
         )
-}
-
-/// Whether a table has the zones gate by gate.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Gates {
-    Included,
-    Omitted,
-}
-
-/// All that the claims need: the zones of named cases in their batches, with those gate by gate or without.
-pub(super) fn batches_table<'p>(
-    all: impl Iterator<Item = (String, &'p Profiles)>,
-    gates: Gates,
-) -> Table {
-    let mut zones = Vec::new();
-    for (case, p) in all {
-        let case = format!("{}; {case}", p.method);
-        zones.push(NamedZone::new(&case, "inside", f64::NAN, &p.inside));
-        zones.push(NamedZone::new(&case, "outside", f64::NAN, &p.outside));
-        if gates == Gates::Omitted {
-            continue;
-        }
-        for zone in &p.evolution {
-            zones.push(NamedZone::new(&case, "evolution", zone.range_m, zone));
-        }
-        for (range_m, zone) in &p.across {
-            zones.push(NamedZone::new(&case, "across", *range_m, zone));
-        }
-    }
-    batches(&zones)
 }
 
 /// Curves of some profiles, less their evolution with range.

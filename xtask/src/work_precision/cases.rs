@@ -20,14 +20,8 @@ pub(super) struct Panel {
     pub(super) title: String,
     /// What is compared with what.
     pub(super) compared: String,
-    pub(super) guide: Option<Guide>,
-}
-
-/// A slope through the first point of this program.
-#[derive(Deserialize)]
-pub(super) struct Guide {
-    pub(super) label: String,
-    pub(super) power: f64,
+    /// A slope through the first point of this program: its label and its power.
+    pub(super) guide: Option<(String, f64)>,
 }
 
 /// All cases, in the order of the panels.

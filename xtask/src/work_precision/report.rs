@@ -1,6 +1,6 @@
 //! The panels of error against run time, this program beside others, and what they say in words.
 
-use super::cases::{CASES, Guide, Panel};
+use super::cases::{CASES, Panel};
 use super::{Row, TARGETS};
 use crate::cost::machine;
 use std::collections::BTreeSet;
@@ -145,7 +145,7 @@ impl Drawn<'_> {
 
     /// The slope through the first point of this program.
     fn guide(&self) -> Option<Series> {
-        let Guide { label, power } = self.panel.guide.as_ref()?;
+        let (label, power) = self.panel.guide.as_ref()?;
         let mut own = self.rows.iter().filter(|row| row.is_own());
         let (start_s, error) = point(own.next()?);
         let last_s = own.map(|row| row.found.cost.cpu_s).fold(start_s, f64::max);
