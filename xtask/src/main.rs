@@ -26,7 +26,7 @@ mod stability;
 mod stability_maps;
 mod statistics;
 #[cfg(test)]
-#[path = "../../crates/les/src/ranks/threads.rs"]
+#[path = "../../crates/les/src/ranks/threads_for_tests.rs"]
 mod thread_ranks;
 mod tidy;
 mod wakes;

@@ -9,7 +9,7 @@
 //! is lost.
 
 #[cfg(test)]
-mod threads;
+mod threads_for_tests;
 
 use std::fmt::{Debug, Display};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use std::time::Instant;
 use crate::Error;
 
 #[cfg(test)]
-pub(crate) use threads::on_threads;
+pub(crate) use threads_for_tests::on_threads;
 
 /// The ranks that share a flow. All of them call the same operations in the same order.
 pub trait Ranks: Debug + Send + Sync {

@@ -43,7 +43,7 @@ pub use pressure::PressureMethod;
 pub use report::{StartReport, StepReport};
 pub use run::{
     CheckpointPlan, EnergyBudget, Interval, NOTICED_GROWTH, Run, RunObserver, RunPlan, RunWarning,
-    Silent, StepEnergy, StepRecord, Stepping,
+    Silent, StepEnergy, StepRecord,
 };
 pub use settings::{FlowSettings, TimeScheme, TimeStep};
 pub use subgrid::SubgridModel;

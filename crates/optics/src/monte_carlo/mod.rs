@@ -33,7 +33,6 @@ use crate::screens::kernel::Real;
 use crate::screens::propagate::Propagator;
 use crate::{Error, Misalignment, Telescope, Turbulence, theory};
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Realisations of one unit of work; their sums are added in order.
@@ -278,11 +277,7 @@ impl MonteCarlo {
         } else {
             1
         };
-        let reporter = Reporter {
-            total,
-            done: AtomicUsize::new(0),
-            progress: Mutex::new(progress),
-        };
+        let reported = Mutex::new((0, progress));
         let mut ranges: Vec<RangeResult<T>> = Vec::new();
         let mut done = 0;
         let mut relative_standard_error = f64::INFINITY;
@@ -292,7 +287,7 @@ impl MonteCarlo {
                 let count = GROUP.min(total - first);
                 let walker = Walker::new(prepared, self.seed, self.sampling);
                 walker.run_group(first, count, &|more| {
-                    reporter.report(more, relative_standard_error)
+                    report(&reported, more, total, relative_standard_error)
                 })
             });
             for group in groups {
@@ -392,28 +387,25 @@ impl MonteCarlo {
 /// The caller's progress function.
 type ProgressFunction<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + 'a;
 
-/// Counts realisations and calls the progress function, from any thread.
-struct Reporter<'a> {
+/// Counts `more` realisations as done and calls the progress function, from any thread; the count
+/// is under its lock, so that the reported numbers do not decrease.
+fn report(
+    reported: &Mutex<(usize, &mut ProgressFunction<'_>)>,
+    more: usize,
     total: usize,
-    done: AtomicUsize,
-    progress: Mutex<&'a mut ProgressFunction<'a>>,
-}
-
-impl Reporter<'_> {
-    /// Reports `more` realisations done.
-    fn report(&self, more: usize, relative_standard_error: f64) -> Result<(), Error> {
-        let mut progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
-        // Counted under the lock, so that the reported numbers do not decrease.
-        let done = self.done.fetch_add(more, Ordering::Relaxed) + more;
-        let flow = progress(Progress {
-            done,
-            total: self.total,
-            relative_standard_error,
-        });
-        match flow {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(Error::Cancelled { realisations: done }),
-        }
+    relative_standard_error: f64,
+) -> Result<(), Error> {
+    let mut reported = reported.lock().unwrap_or_else(PoisonError::into_inner);
+    reported.0 += more;
+    let done = reported.0;
+    let flow = (reported.1)(Progress {
+        done,
+        total,
+        relative_standard_error,
+    });
+    match flow {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(Error::Cancelled { realisations: done }),
     }
 }
 

@@ -60,18 +60,19 @@ impl Trial {
         }
     }
 
+    /// The row of a value of a setting with this run, without shifts.
+    fn row(&self, value: f64, label: String) -> Row {
+        match &self.history {
+            Ok(_) => Row::new(value, label, self.run_s),
+            Err(error) => Row::refused(value, label, error),
+        }
+    }
+
     fn series(&self, metric: Metric) -> Option<&[f64]> {
         let history = self.history.as_ref().ok()?;
         let index = METRICS.iter().position(|own| *own == metric)?;
         Some(&history[index])
     }
-}
-
-/// A value of a setting with its run.
-struct Entry<'a> {
-    value: f64,
-    label: String,
-    trial: &'a Trial,
 }
 
 impl Report {
@@ -117,11 +118,8 @@ impl Report {
         let cells = meshes.iter().zip(&on_meshes).map(|((_, mesh), trial)| {
             let cells = mesh.content.case.cells();
             let [nx, ny, nz] = cells;
-            Entry {
-                value: count(cells),
-                label: format!("{nx} x {ny} x {nz}"),
-                trial,
-            }
+            let label = format!("{nx} x {ny} x {nz}");
+            (trial.row(count(cells), label), trial)
         });
         report.add(CELLS, count(file.content.case.cells()), cells.collect());
         let steps = [
@@ -129,34 +127,24 @@ impl Report {
             (given_step, given),
             (longer_step, &long),
         ];
-        let steps = steps.map(|(value, trial)| Entry {
-            value,
-            label: float_text(value),
-            trial,
-        });
+        let steps = steps.map(|(value, trial)| (trial.row(value, float_text(value)), trial));
         report.add(key, given_step, steps.into());
         Ok(report)
     }
 
-    /// Adds a setting from its runs, the finest first, and a note on the order of its errors.
-    fn add(&mut self, key: &'static str, given: f64, entries: Vec<Entry<'_>>) {
-        let mut rows: Vec<Row> = Vec::new();
+    /// Adds a setting from the rows of its values and their runs, the finest first, and a note on
+    /// the order of its errors.
+    fn add(&mut self, key: &'static str, given: f64, entries: Vec<(Row, &Trial)>) {
+        let (mut rows, trials): (Vec<Row>, Vec<&Trial>) = entries.into_iter().unzip();
         let mut spacings = Vec::new();
-        for entry in &entries {
-            let label = entry.label.clone();
-            rows.push(match &entry.trial.history {
-                Ok(_) => {
-                    spacings.push(entry.trial.spacing);
-                    Row::new(entry.value, label, entry.trial.run_s)
-                }
-                Err(error) => Row::refused(entry.value, label, error),
-            });
+        for trial in &trials {
+            if trial.history.is_ok() {
+                spacings.push(trial.spacing);
+            }
         }
         let mut orders = Vec::new();
         for metric in &self.metrics {
-            let known = entries
-                .iter()
-                .filter_map(|entry| entry.trial.series(*metric));
+            let known = trials.iter().filter_map(|trial| trial.series(*metric));
             let (order, errors) = richardson(&spacings, &known.collect::<Vec<_>>());
             let order = match order {
                 None => "does not converge".into(),
@@ -266,7 +254,7 @@ fn norm(a: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::Silent;
-    use crate::flow::plane_vortices::PlaneVortices;
+    use crate::flow::plane_vortices;
     use std::f64::consts::PI;
     use std::path::Path;
 
@@ -288,8 +276,13 @@ mod tests {
 
     #[test]
     fn the_errors_of_decaying_vortices_match_those_from_the_closed_form() {
-        let field = PlaneVortices::new();
-        let own = field.case(32, 0.005, "[time]\nend_s = 1.0\nlongest_step_s = 0.005\n");
+        let field = plane_vortices::folder();
+        let own = plane_vortices::case(
+            &field,
+            32,
+            0.005,
+            "[time]\nend_s = 1.0\nlongest_step_s = 0.005\n",
+        );
         let found = Report::of_case(&own, &request(&[]), &Silent).unwrap();
         assert_eq!(found.metrics, [Metric::Energy, Metric::Dissipation]);
         // Energy exp(-16 pi^2 nu t)/4, of which 16 pi^2 nu is lost in a time.

@@ -1,7 +1,7 @@
 //! `wakescope accuracy`: numerical error and run time of a scene or flow, setting by setting.
 
 use super::Cli;
-use super::flow::case_file;
+use super::flow::{case_file, seeded};
 use super::words::FolderWords;
 use crate::Error;
 use crate::accuracy::{Report, Request};
@@ -37,10 +37,7 @@ pub(super) fn accuracy(args: &AccuracyArgs, cli: &Cli) -> Result<u8, Error> {
             Report::of_scene(&file, &args.request, &*cli.observer())?
         }
         None => {
-            let mut file = case_file(path, args.preset, cli)?;
-            if let Some(seed) = cli.seed {
-                file = file.with_seed(seed)?;
-            }
+            let file = seeded(case_file(path, args.preset, cli)?, cli)?;
             prepare()?;
             Report::of_case(&file, &args.request, &*cli.observer())?
         }

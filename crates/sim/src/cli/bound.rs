@@ -1,50 +1,34 @@
 //! `wakescope bound` and `wakescope budget`: what the instrument of a scene can measure at best, and its power budget.
 
-use super::words::range;
 use super::{Cli, paths};
 use crate::io::Existing;
 use crate::measure::bound::{bound as of_plan, points};
 use crate::measure::budget::{Budget, scan_ranges_m};
 use crate::outputs::Outputs;
-use crate::plan::{Plan, Target};
+use crate::plan::Plan;
 use crate::setup::progress::Silent;
 use crate::{Error, scene};
-use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::Path;
 
-/// Words of `wakescope bound`.
-#[derive(Debug, Args)]
-pub(super) struct BoundWords {
-    /// The scene.
-    scene: PathBuf,
-    /// File for the whole table, as CSV.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Replace an existing file.
-    #[arg(long)]
+/// Prints the bound of a plan and writes its table to a file, if there is one.
+pub(super) fn bound(
+    plan: &Plan,
+    out: Option<&Path>,
     overwrite: bool,
-    /// Compute even if the forecast of the memory is more than the machine has.
-    #[arg(long)]
-    allow_large: bool,
-}
-
-pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
-    let plan = Plan::new(cli.scene(&words.scene)?, Target::Map)?;
-    if !words.allow_large {
-        plan.bound_fits()?;
+    cli: &Cli,
+) -> Result<(), Error> {
+    if let Some(file) = out {
+        cli.prepare_file(file, Existing::with_overwrite(overwrite))?;
     }
-    if let Some(file) = &words.out {
-        cli.prepare_file(file, Existing::with_overwrite(words.overwrite))?;
-    }
-    let found = of_plan(&plan, &Silent)?;
+    let found = of_plan(plan, &Silent)?;
     let mut text = found.text();
-    if let Some(file) = &words.out {
+    if let Some(file) = out {
         cli.write_file(file, found.table().to_csv(&plan.scene.provenance())?)?;
         text += &format!("wrote {}\n", file.display());
     }
-    let file = words.out.as_ref().map(|file| file.display().to_string());
+    let file = out.map(|file| file.display().to_string());
     let object = json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "by_snr": points(&found.by_snr).objects(),
         "by_range": points(&found.by_range).objects(),
@@ -53,37 +37,28 @@ pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
     cli.say(&object, &text)
 }
 
-/// Words of `wakescope budget`.
-#[derive(Debug, Args)]
-pub(super) struct BudgetWords {
-    /// The scene.
-    scene: PathBuf,
-    /// Ranges, m, such as 280,400; those of the beginning, the middle and the end of the scan without them.
-    #[arg(long, value_name = "M,M,...", value_delimiter = ',', value_parser = range)]
-    range: Vec<f64>,
-    /// Folder for the table, budget.csv; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Replace an existing table.
-    #[arg(long)]
+/// Prints the budget of a plan at some ranges, m, or those of its scan, and writes its table to a
+/// folder, if there is one.
+pub(super) fn budget(
+    plan: &Plan,
+    range_m: &[f64],
+    out: Option<&Path>,
     overwrite: bool,
-}
-
-pub(super) fn budget(words: &BudgetWords, cli: &Cli) -> Result<(), Error> {
-    let plan = Plan::new(cli.scene(&words.scene)?, Target::Efficiency)?;
-    let existing = Existing::with_overwrite(words.overwrite);
-    if let Some(folder) = &words.out {
+    cli: &Cli,
+) -> Result<(), Error> {
+    let existing = Existing::with_overwrite(overwrite);
+    if let Some(folder) = out {
         cli.prepare(folder, &["budget.csv".into()], existing)?;
     }
-    let ranges_m = if words.range.is_empty() {
+    let ranges_m = if range_m.is_empty() {
         scan_ranges_m(&plan.scene.content)
     } else {
-        words.range.clone()
+        range_m.to_vec()
     };
-    let found = Budget::new(&plan, &ranges_m, &*cli.observer())?;
+    let found = Budget::new(plan, &ranges_m, &*cli.observer())?;
     let mut text = found.text();
     let mut files = Vec::new();
-    if let Some(folder) = &words.out {
+    if let Some(folder) = out {
         let of = (scene::Outputs::default(), plan.scene.provenance());
         let list =
             |files: &mut Outputs| files.table("budget", Some(&found), |found| Ok(found.table()));

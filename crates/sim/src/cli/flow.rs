@@ -6,8 +6,7 @@ use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
 use crate::flow::{
-    Begin, CaseFile, CaseKind, EXAMPLES, FlowOutcome, RunOptions, WakePreset, check_on, example,
-    run_on,
+    Begin, CaseFile, CaseKind, FlowOutcome, RunOptions, WakePreset, check_on, example, run_on,
 };
 use crate::setup::progress::{Observer, Silent};
 use clap::Args;
@@ -16,37 +15,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wakescope_les::ranks::{Ranks, Single};
 
-/// Words of `wakescope flow`.
-#[derive(Debug, Args)]
-pub(super) struct FlowWords {
-    /// The case file; --example prints one.
-    #[arg(required_unless_present = "example")]
-    case: Option<PathBuf>,
-    #[command(flatten)]
-    run: RunWords,
-    /// Print a commented case file and do nothing else.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "out"], value_parser = EXAMPLES.map(|(name, _)| name))]
-    example: Option<String>,
-}
-
-/// Words of `wakescope wake`.
-#[derive(Debug, Args)]
-pub(super) struct WakeWords {
-    /// A case file with kind = "wake"; keys that it lacks are those of the preset.
-    case: Option<PathBuf>,
-    /// How fine the flow is; coarse without one, unless a case file is given.
-    #[arg(long, value_enum)]
-    preset: Option<WakePreset>,
-    /// Print the case file and do nothing else.
-    #[arg(long)]
-    print: bool,
-    #[command(flatten)]
-    run: RunWords,
-}
-
 /// Where a simulation writes and how it begins.
 #[derive(Debug, Args)]
-pub(super) struct RunWords {
+pub(super) struct RunArgs {
     /// Folder to write to; made if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -67,42 +38,77 @@ pub(super) struct RunWords {
     allow_large: bool,
 }
 
-pub(super) fn flow(words: &FlowWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
-    if let Some(text) = words.example.as_deref().and_then(example) {
-        return if ranks.rank() == 0 {
-            cli.print(text)
-        } else {
-            Ok(())
-        };
-    }
-    // The words were checked: without an example there is a case.
-    let Some(case) = &words.case else {
-        return Ok(());
-    };
-    let file = cli.case(case, None)?;
-    simulate(file, &words.run, cli, ranks)
+/// Runs `wakescope flow`: prints an example, or simulates a case.
+pub(super) fn flow(
+    example_name: Option<&str>,
+    case: Option<&Path>,
+    run: &RunArgs,
+    cli: &Cli,
+) -> Result<(), Error> {
+    ranked(cli, |ranks| {
+        match (example_name.and_then(example), case) {
+            (Some(text), _) => print(text, cli, ranks),
+            (None, Some(case)) => simulate(cli.case(case, None)?, run, cli, ranks),
+            // Arguments were checked: without an example there is a case.
+            (None, None) => Ok(()),
+        }
+    })
 }
 
-pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
-    let file = case_file(words.case.as_deref(), words.preset, cli)?;
-    if !matches!(file.content.case, CaseKind::Wake(_)) {
-        let path = words.case.clone().unwrap_or_default();
-        return Err(Error::Input {
-            path,
-            reason: "case.kind is not \"wake\": wakescope flow runs it".into(),
-        });
+/// Runs `wakescope wake`: simulates a case file, a preset, or the one over the other.
+pub(super) fn wake(
+    case: Option<&Path>,
+    preset: Option<WakePreset>,
+    run: &RunArgs,
+    cli: &Cli,
+) -> Result<(), Error> {
+    ranked(cli, |ranks| {
+        simulate(wake_file(case, preset, cli)?, run, cli, ranks)
+    })
+}
+
+/// Runs `wakescope wake --print`: prints the case file.
+pub(super) fn print_wake(
+    case: Option<&Path>,
+    preset: Option<WakePreset>,
+    cli: &Cli,
+) -> Result<(), Error> {
+    ranked(cli, |ranks| {
+        let file = seeded(wake_file(case, preset, cli)?, cli)?;
+        print(&file.toml, cli, ranks)
+    })
+}
+
+/// Prints a text, on rank 0.
+fn print(text: &str, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
+    if ranks.rank() > 0 {
+        return Ok(());
     }
-    if words.print {
-        let file = cli
-            .seed
-            .map_or(Ok(file.clone()), |seed| file.with_seed(seed))?;
-        return if ranks.rank() == 0 {
-            cli.print(&file.toml)
-        } else {
-            Ok(())
-        };
+    cli.print(text)
+}
+
+/// The case file of a wake.
+fn wake_file(
+    path: Option<&Path>,
+    preset: Option<WakePreset>,
+    cli: &Cli,
+) -> Result<CaseFile, Error> {
+    let file = case_file(path, preset, cli)?;
+    if matches!(file.content.case, CaseKind::Wake(_)) {
+        return Ok(file);
     }
-    simulate(file, &words.run, cli, ranks)
+    Err(Error::Input {
+        path: path.unwrap_or(Path::new("")).to_owned(),
+        reason: "case.kind is not \"wake\": wakescope flow runs it".into(),
+    })
+}
+
+/// A case with the seed of the command line.
+pub(super) fn seeded(file: CaseFile, cli: &Cli) -> Result<CaseFile, Error> {
+    match cli.seed {
+        Some(seed) => Ok(file.with_seed(seed)?),
+        None => Ok(file),
+    }
 }
 
 /// A case file, a preset, or the one over the other; the coarse preset without either.
@@ -124,31 +130,29 @@ pub(super) fn case_file(
 /// Runs a case and says what came of it, on rank 0.
 fn simulate(
     mut file: CaseFile,
-    words: &RunWords,
+    args: &RunArgs,
     cli: &Cli,
     ranks: &Arc<dyn Ranks>,
 ) -> Result<(), Error> {
     let is_first = ranks.rank() == 0;
-    if let Some(end) = words.end {
+    if let Some(end) = args.end {
         file = file.with_end(end)?;
     }
-    if let Some(seed) = cli.seed {
-        file = file.with_seed(seed)?;
-    }
-    let begin = match (words.restart, words.overwrite) {
+    let file = seeded(file, cli)?;
+    let begin = match (args.restart, args.overwrite) {
         (true, _) => Begin::Restart,
         (_, true) => Begin::Overwrite,
         _ => Begin::New,
     };
     let options = RunOptions {
         begin,
-        allow_large: words.allow_large,
+        allow_large: args.allow_large,
     };
-    if words.check {
+    if args.check {
         if !is_first {
             return Ok(());
         }
-        let forecast = check_on(ranks, &file, words.out.as_deref(), options)?;
+        let forecast = check_on(ranks, &file, args.out.as_deref(), options)?;
         forecast
             .notes
             .iter()
@@ -157,7 +161,7 @@ fn simulate(
         object["version"] = crate::VERSION.into();
         return cli.say(&object, &format!("good\n{forecast}"));
     }
-    let Some(out) = &words.out else {
+    let Some(out) = &args.out else {
         return Err(Error::Input {
             path: "--out DIR".into(),
             reason: "a run needs a folder to write to".into(),
@@ -194,13 +198,14 @@ fn simulate(
         is_complete,
         kinetic_energy_m5_s2,
         relative_divergence,
-        stepping,
+        steps_wall_s,
+        exchange_wall_s,
         ..
     } = outcome;
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": steps, "time_s": time_s, "is_complete": is_complete,
-        "kinetic_energy_m5_s2": kinetic_energy_m5_s2, "relative_divergence": relative_divergence, "steps_wall_s": stepping.wall_s,
-        "exchange_wall_s": stepping.exchange_s, "files": paths(&outcome.files), "warnings": outcome.warnings,
+        "kinetic_energy_m5_s2": kinetic_energy_m5_s2, "relative_divergence": relative_divergence, "steps_wall_s": steps_wall_s,
+        "exchange_wall_s": exchange_wall_s, "files": paths(&outcome.files), "warnings": outcome.warnings,
     });
     let state = if is_complete {
         "done"
@@ -212,11 +217,8 @@ fn simulate(
     );
     text += &format!("relative divergence {relative_divergence:.1e}\n");
     if ranks.count() > 1 {
-        let share = 100.0 * stepping.exchange_s / stepping.wall_s;
-        text += &format!(
-            "steps took {:.1} s, {share:.1} % of it in turns and halos\n",
-            stepping.wall_s
-        );
+        let share = 100.0 * exchange_wall_s / steps_wall_s;
+        text += &format!("steps took {steps_wall_s:.1} s, {share:.1} % of it in turns and halos\n");
     }
     cli.say(
         &object,
@@ -232,10 +234,7 @@ fn simulate(
 const COUNTS: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
 
 /// Runs `work` on the processes that share it. Where it fails, rank 0 alone says so, and all end.
-pub(super) fn ranked(
-    cli: &Cli,
-    work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>,
-) -> Result<(), Error> {
+fn ranked(cli: &Cli, work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>) -> Result<(), Error> {
     let started = COUNTS
         .iter()
         .find_map(|name| std::env::var(name).ok()?.parse::<usize>().ok());

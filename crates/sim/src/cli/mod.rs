@@ -15,6 +15,7 @@ mod retrieve;
 mod sweep;
 mod words;
 
+use crate::flow::{EXAMPLES, WakePreset};
 use crate::io::Existing;
 use crate::io::csv::digits;
 use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
@@ -73,7 +74,7 @@ enum Command {
         preset: Option<String>,
     },
     /// Check a scene and print the plan: what will run, what is left out and why, at what cost.
-    Check(CheckWords),
+    Check(CheckArgs),
     /// Run the whole measurement and write everything that the scene asks for.
     Run(Io),
     /// Heterodyne efficiency and signal-to-noise ratio against range.
@@ -87,9 +88,33 @@ enum Command {
     /// Circulation, place and core of the vortices in scans of any instrument.
     Retrieve(retrieve::RetrieveWords),
     /// The Cramer-Rao bound on the velocity, against signal-to-noise ratio and against range.
-    Bound(bound::BoundWords),
+    Bound {
+        /// The scene.
+        scene: PathBuf,
+        /// File for the whole table, as CSV.
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+        /// Replace an existing file.
+        #[arg(long)]
+        overwrite: bool,
+        /// Compute even if the forecast of the memory is more than the machine has.
+        #[arg(long)]
+        allow_large: bool,
+    },
     /// The power budget in dB, from the energy of a pulse to the signal-to-noise ratio, with what bounds the instrument.
-    Budget(bound::BudgetWords),
+    Budget {
+        /// The scene.
+        scene: PathBuf,
+        /// Ranges, m, such as 280,400; those of the beginning, the middle and the end of the scan without them.
+        #[arg(long, value_name = "M,M,...", value_delimiter = ',', value_parser = words::range)]
+        range: Vec<f64>,
+        /// Folder for the table, budget.csv; made if it does not exist.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Replace an existing table.
+        #[arg(long)]
+        overwrite: bool,
+    },
     /// Whether scans hold a wake, at a rate of false alarms; the smallest circulation that is found.
     Detect(detect::DetectWords),
     /// Run many scenes that differ in some keys: a table and pictures of what each gives.
@@ -97,9 +122,29 @@ enum Command {
     /// Numerical error and run time of a scene or flow, setting by setting.
     Accuracy(accuracy::AccuracyArgs),
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
-    Flow(flow::FlowWords),
+    Flow {
+        /// The case file; --example prints one.
+        #[arg(required_unless_present = "example")]
+        case: Option<PathBuf>,
+        #[command(flatten)]
+        run: flow::RunArgs,
+        /// Print a commented case file and do nothing else.
+        #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "out"], value_parser = EXAMPLES.map(|(name, _)| name))]
+        example: Option<String>,
+    },
     /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
-    Wake(flow::WakeWords),
+    Wake {
+        /// A case file with kind = "wake"; keys that it lacks are those of the preset.
+        case: Option<PathBuf>,
+        /// How fine the flow is; coarse without one, unless a case file is given.
+        #[arg(long, value_enum)]
+        preset: Option<WakePreset>,
+        /// Print the case file and do nothing else.
+        #[arg(long)]
+        print: bool,
+        #[command(flatten)]
+        run: flow::RunArgs,
+    },
 }
 
 #[derive(Debug, Args)]
@@ -113,9 +158,9 @@ struct Io {
     allow_large: bool,
 }
 
-/// Words of `wakescope check`.
+/// Arguments of `wakescope check`.
 #[derive(Debug, Args)]
-struct CheckWords {
+struct CheckArgs {
     /// The scene.
     scene: PathBuf,
     /// Folder that a run is to write to: check it, too.
@@ -158,19 +203,48 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
             force,
             preset,
         } => init(scene, *force, preset.as_deref(), cli),
-        Command::Check(words) => check(words, cli),
+        Command::Check(args) => check(args, cli),
         Command::Run(io) => execute(io, Target::Run, cli),
         Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
         Command::Signal(io) => execute(io, Target::Signal, cli),
         Command::Map(io) => execute(io, Target::Map, cli),
         Command::Estimate(words) => estimate::estimate(words, cli),
         Command::Retrieve(words) => retrieve::retrieve(words, cli),
-        Command::Bound(words) => bound::bound(words, cli),
-        Command::Budget(words) => bound::budget(words, cli),
+        Command::Bound {
+            scene,
+            out,
+            overwrite,
+            allow_large,
+        } => {
+            let plan = Plan::new(cli.scene(scene)?, Target::Map)?;
+            if !allow_large {
+                plan.bound_fits()?;
+            }
+            bound::bound(&plan, out.as_deref(), *overwrite, cli)
+        }
+        Command::Budget {
+            scene,
+            range,
+            out,
+            overwrite,
+        } => {
+            let plan = Plan::new(cli.scene(scene)?, Target::Efficiency)?;
+            bound::budget(&plan, range, out.as_deref(), *overwrite, cli)
+        }
         Command::Detect(words) => detect::detect(words, cli),
         Command::Sweep(words) => sweep::sweep(words, cli),
-        Command::Flow(words) => flow::ranked(cli, |ranks| flow::flow(words, cli, ranks)),
-        Command::Wake(words) => flow::ranked(cli, |ranks| flow::wake(words, cli, ranks)),
+        Command::Flow { case, run, example } => {
+            flow::flow(example.as_deref(), case.as_deref(), run, cli)
+        }
+        Command::Wake {
+            case,
+            preset,
+            print: true,
+            ..
+        } => flow::print_wake(case.as_deref(), *preset, cli),
+        Command::Wake {
+            case, preset, run, ..
+        } => flow::wake(case.as_deref(), *preset, run, cli),
     }?;
     Ok(0)
 }
@@ -202,15 +276,15 @@ fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(),
 /// What the ratio of a check lacks where phase screens make the efficiency.
 const AS_ON_INDEPENDENT_PATHS: &str = "; turbulence as on independent paths: one path out and back returns more, by as much as wakescope budget says";
 
-fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
-    let plan = planned(&words.scene, Target::Run, words.allow_large, cli)?;
-    let existing = Existing::with_overwrite(words.overwrite);
-    if let Some(folder) = &words.out {
+fn check(args: &CheckArgs, cli: &Cli) -> Result<(), Error> {
+    let plan = planned(&args.scene, Target::Run, args.allow_large, cli)?;
+    let existing = Existing::with_overwrite(args.overwrite);
+    if let Some(folder) = &args.out {
         // What is in the way of a run is in the way of it here, too.
         cli.prepare(folder, &write::names(&plan)?, existing)?;
     }
     #[cfg(feature = "plots")]
-    if let Some(path) = &words.picture {
+    if let Some(path) = &args.picture {
         write::write_set_up(&plan, path, existing)?;
     }
     if cli.quiet && !cli.json {
@@ -237,7 +311,7 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     let short = format!("SNR in the band, one pulse, at {ranges} m: {ratios} dB{screens}");
     cli.say(
         &object,
-        &format!("{}: good\n{plan}  {short}\n", words.scene.display()),
+        &format!("{}: good\n{plan}  {short}\n", args.scene.display()),
     )
 }
 

@@ -38,8 +38,8 @@ impl CaseKind {
             Self::Free(_) => return Vec::new(),
         };
         // What makes no mesh has been refused.
-        let resolution = pair.and_then(|pair| pair.resolution());
-        resolution.map_or_else(|_| Vec::new(), |resolution| resolution.warnings())
+        pair.and_then(|pair| pair.unresolved_lengths())
+            .unwrap_or_default()
     }
 
     /// Cells along x, y, z.

@@ -22,7 +22,7 @@ mod ranks_tests;
 mod setup;
 mod text;
 #[cfg(test)]
-#[path = "../../../les/src/ranks/threads.rs"]
+#[path = "../../../les/src/ranks/threads_for_tests.rs"]
 mod thread_ranks;
 pub(crate) mod trial;
 mod vortex_pair;
@@ -44,7 +44,6 @@ pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakePr
 use crate::Error;
 use crate::keys::{Content, Document, Problem, SceneError, to_table};
 use std::path::{Path, PathBuf};
-use wakescope_les::solver::Stepping;
 
 /// A valid case, with what names it.
 pub type CaseFile = Document<FlowCase>;
@@ -175,8 +174,10 @@ pub struct FlowOutcome {
     pub time_s: f64,
     /// Whether that is the end, not a pause.
     pub is_complete: bool,
-    /// Wall time of the steps, and of exchanges between ranks in them.
-    pub stepping: Stepping,
+    /// Wall time of the steps \[s\].
+    pub steps_wall_s: f64,
+    /// Part of it in exchanges between ranks \[s\].
+    pub exchange_wall_s: f64,
     /// Kinetic energy, integral of `u^2/2` \[m^5/s^2\].
     pub kinetic_energy_m5_s2: f64,
     /// Largest divergence over the largest `sum |u_i|/h_i`.

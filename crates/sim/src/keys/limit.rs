@@ -23,9 +23,6 @@ pub(crate) struct Is<T, W>(pub(crate) fn(&T) -> bool, pub(crate) W);
 /// A name that has to be stated, and what it names.
 pub(crate) struct Named(pub(crate) &'static str);
 
-/// In a range; `-inf` stands for none.
-pub(crate) struct NothingOr(pub(crate) RangeInclusive<f64>);
-
 /// Above 0; `inf` stands for none.
 pub(crate) const ABOVE_ZERO_OR_INF: Number =
     Number(|value| value > 0.0, "above 0 {}, or inf for none");
@@ -75,23 +72,6 @@ impl Limit<f64> for RangeInclusive<f64> {
             key,
             value,
             format!("a number from {low:?} to {high:?} {unit}").trim_end(),
-        );
-    }
-}
-
-impl Limit<f64> for NothingOr {
-    fn hold(&self, key: &str, value: &f64, c: &mut Checker<'_>) {
-        let (low, high, unit) = (
-            self.0.start(),
-            self.0.end(),
-            unit_of(key).unwrap_or_default(),
-        );
-        let allowed = format!("a number from {low:?} to {high:?} {unit}, or -inf for none");
-        c.require(
-            *value == f64::NEG_INFINITY || self.0.contains(value),
-            key,
-            value,
-            allowed,
         );
     }
 }

@@ -3,7 +3,7 @@
 //! Check: impossible values and keys without effect are named; what is off is not written.
 
 use super::Scene;
-use crate::keys::{ABOVE_ZERO_OR_INF, Checker, NothingOr, Number, ZERO_OR_MORE, keys};
+use crate::keys::{ABOVE_ZERO_OR_INF, Checker, Number, ZERO_OR_MORE, keys};
 use wakescope_optics::RadiusDefinition;
 use wakescope_optics::plan::Receiver as ReceiverPath;
 use wakescope_signal::{NoiseModel, PulseDuration};
@@ -144,7 +144,10 @@ keys! {
         /// Loss of the optics, out and back together, with the light whose polarisation does not beat, dB.
         optics_loss_db: f64 as omitted = 0.0 => 0.0..=200.0,
         /// Part of the pulse that the telescope sends straight to the detector, dB; `-inf` for none.
-        reflection_db: f64 as omitted = f64::NEG_INFINITY => NothingOr(-300.0..=0.0),
+        reflection_db: f64 as omitted = f64::NEG_INFINITY => Number(
+            |value| value == f64::NEG_INFINITY || (-300.0..=0.0).contains(&value),
+            "a number from -300.0 to 0.0 {}, or -inf for none",
+        ),
         /// Range up to which nothing is seen, because the detector recovers from the reflection, m; 0 for none.
         blind_range_m: f64 as omitted = 0.0 => 0.0..=1e6,
     }
@@ -161,7 +164,10 @@ keys! {
         /// Dark current of the detector, A.
         dark_current_a: f64 = 0.0 => 0.0..=1.0,
         /// Relative intensity noise of the local oscillator, dB/Hz; `-inf` for none.
-        intensity_noise_db_hz: f64 = f64::NEG_INFINITY => NothingOr(-400.0..=0.0),
+        intensity_noise_db_hz: f64 = f64::NEG_INFINITY => Number(
+            |value| value == f64::NEG_INFINITY || (-400.0..=0.0).contains(&value),
+            "a number from -400.0 to 0.0 {}, or -inf for none",
+        ),
         /// Rejection of what both halves of a balanced detector see, electrical, dB.
         rejection_db: f64 = 0.0 => 0.0..=200.0,
         /// Power at which the current has fallen to half of the linear one, W; `inf` for none.

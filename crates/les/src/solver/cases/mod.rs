@@ -15,7 +15,6 @@ mod vortex_pair;
 pub use boxes::{dipole_between_walls, dipole_in_a_box, lid_driven_cavity};
 pub use channel::{Plates, channel};
 pub use orr_sommerfeld::TollmienSchlichting;
-pub use resolution::Resolution;
 pub use taylor_green::{
     taylor_green_3d, taylor_green_eighth, taylor_green_plane, taylor_green_plane_exact,
 };

@@ -7,28 +7,42 @@ use super::super::mesh::Mesh;
 use super::VortexPairCase;
 use crate::Error;
 
-/// Cells of the mesh of a vortex pair across the lengths that it must resolve.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Resolution {
-    /// Cells per core radius along y and z, at the core.
-    pub core_cells: [f64; 2],
-    /// Cells across the boundary layer; `None` without a no-slip wall across z.
-    pub layer_cells: Option<f64>,
-}
-
 /// Least cells per core radius.
 const CORE_CELLS: f64 = 2.5;
 /// Least cells across a boundary layer.
 const LAYER_CELLS: f64 = 3.0;
 
-impl Resolution {
-    /// Of the pair in its own units, in which its mesh has the given faces. The boundary layer is `sqrt(nu b0/V0)` thick with
-    /// `nu = 2 pi b0 V0/reynolds`.
-    fn new(mesh: &Mesh, pair: &VortexPairCase) -> Self {
-        let core = [0.5, pair.height];
-        let core_cells =
-            std::array::from_fn(|i| pair.core_radius / cell_width(&mesh.face_m(i + 1), core[i]));
-        let layer = (TAU / pair.reynolds).sqrt();
+impl VortexPairCase {
+    /// One sentence for each length that the mesh of the case does not resolve: the core radius
+    /// along y and z, and the boundary layer under the cores, across no-slip walls across z.
+    ///
+    /// # Errors
+    /// A mesh that [`Mesh::new`] refuses.
+    pub fn unresolved_lengths(&self) -> Result<Vec<String>, Error> {
+        let mesh = self.mesh(1.0)?;
+        let core = [0.5, self.height];
+        let mut warnings = Vec::new();
+        for (i, axis) in ["y", "z"].into_iter().enumerate() {
+            let cells = self.core_radius / cell_width(&mesh.face_m(i + 1), core[i]);
+            if cells < CORE_CELLS {
+                let what = format!("the core radius along {axis}");
+                warnings.push(warning(&what, cells, CORE_CELLS));
+            }
+        }
+        if let Some(cells) = self.layer_cells(&mesh)
+            && cells < LAYER_CELLS
+        {
+            let what = "the boundary layer, across the wall,";
+            let text = warning(what, cells, LAYER_CELLS);
+            warnings.push(format!("{text}, or a lower Reynolds number"));
+        }
+        Ok(warnings)
+    }
+
+    /// Cells across the boundary layer; `None` without a no-slip wall across z. In the units of the
+    /// pair it is `sqrt(nu b0/V0)` thick with `nu = 2 pi b0 V0/reynolds`.
+    fn layer_cells(&self, mesh: &Mesh) -> Option<f64> {
+        let layer = (TAU / self.reynolds).sqrt();
         let [_, _, z] = mesh.directions();
         let [low, high] = z.ends.no_slip();
         let mut from_low = mesh.face_m(2);
@@ -42,39 +56,7 @@ impl Resolution {
         }
         let at_low = low.then(|| cells_within(&from_low, layer));
         let at_high = high.then(|| cells_within(&from_high, layer));
-        Self {
-            core_cells,
-            layer_cells: at_low.into_iter().chain(at_high).reduce(f64::min),
-        }
-    }
-
-    /// One sentence for each length that has too few cells.
-    pub fn warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
-        for (axis, cells) in ["y", "z"].into_iter().zip(self.core_cells) {
-            if cells < CORE_CELLS {
-                let what = format!("the core radius along {axis}");
-                warnings.push(warning(&what, cells, CORE_CELLS));
-            }
-        }
-        if let Some(cells) = self.layer_cells
-            && cells < LAYER_CELLS
-        {
-            let what = "the boundary layer, across the wall,";
-            let text = warning(what, cells, LAYER_CELLS);
-            warnings.push(format!("{text}, or a lower Reynolds number"));
-        }
-        warnings
-    }
-}
-
-impl VortexPairCase {
-    /// How well the mesh of the case resolves its cores and the boundary layer under them.
-    ///
-    /// # Errors
-    /// A mesh that [`Mesh::new`] refuses.
-    pub fn resolution(&self) -> Result<Resolution, Error> {
-        Ok(Resolution::new(&self.mesh(1.0)?, self))
+        at_low.into_iter().chain(at_high).reduce(f64::min)
     }
 }
 
@@ -110,7 +92,7 @@ mod tests {
     use super::*;
 
     fn warnings(pair: VortexPairCase) -> Vec<String> {
-        pair.resolution().unwrap().warnings()
+        pair.unresolved_lengths().unwrap()
     }
 
     #[test]

@@ -44,58 +44,28 @@ impl Fold {
         }
     }
 
-    /// Adds a block of columns that begins at the place `start`, folded as often as it can be.
+    /// Adds a block of columns that begins at the place `start`, folded as often as it can be: if
+    /// it is large enough and all its columns are even or odd about its middle or its first place.
     fn add(&mut self, start: usize, columns: Columns) {
-        let Some(halves) = Halves::of_columns(&columns) else {
-            let mut entries = Vec::with_capacity(columns.len());
-            for (number, column) in columns {
-                self.columns.push(number);
-                entries.push(column);
-            }
-            self.blocks.push((start, entries));
-            return;
-        };
-        for pair in halves.pairs {
-            self.pairs.push(pair.map(|place| start + place));
-        }
-        let middle = start + halves.even.len();
-        self.add(start, halves.even);
-        self.add(middle, halves.odd);
-    }
-}
-
-/// Columns with their numbers.
-type Columns = Vec<(usize, Vec<f64>)>;
-
-/// Column `m` of a matrix of `n` rows, given row by row.
-fn column(n: usize, matrix: &[f64], m: usize) -> Vec<f64> {
-    matrix.chunks(n).map(|row| row[m]).collect()
-}
-
-/// A block of columns that are even or odd about a point.
-#[derive(Debug)]
-struct Halves {
-    /// Places that mirror each other.
-    pairs: Vec<[usize; 2]>,
-    /// Sums of the places of pairs, and the places that mirror themselves, of the even columns.
-    even: Columns,
-    /// Differences, at the higher place of each pair, of the odd columns.
-    odd: Columns,
-}
-
-impl Halves {
-    /// The halves of a block, if it is large enough and all its columns are even or odd about its
-    /// middle or its first place.
-    fn of_columns(columns: &Columns) -> Option<Self> {
         let n = columns.len();
-        if n < WORTH {
-            return None;
+        if n >= WORTH
+            && (self.add_folded(start, &columns, n - 1) || self.add_folded(start, &columns, 0))
+        {
+            return;
         }
-        Self::about(columns, n - 1).or_else(|| Self::about(columns, 0))
+        let mut entries = Vec::with_capacity(n);
+        for (number, column) in columns {
+            self.columns.push(number);
+            entries.push(column);
+        }
+        self.blocks.push((start, entries));
     }
 
-    /// The halves for the mirror image `centre - place`, in the periodic sense.
-    fn about(columns: &Columns, centre: usize) -> Option<Self> {
+    /// Adds the two halves of a block that the mirror image `centre - place`, in the periodic
+    /// sense, has: sums of the places of pairs, and the places that mirror themselves, of the even
+    /// columns; differences, at the higher place of each pair, of the odd columns. Returns whether
+    /// the block has them.
+    fn add_folded(&mut self, start: usize, columns: &Columns, centre: usize) -> bool {
         let n = columns.len();
         let mirrored: Vec<usize> = (0..n).map(|place| (centre + n - place) % n).collect();
         let mut largest = 0.0_f64;
@@ -116,20 +86,30 @@ impl Halves {
                 let means = high.map(|i| 0.5 * (column[mirrored[i]] - column[i]));
                 odd.push((*number, means.collect()));
             } else {
-                return None;
+                return false;
             }
         }
         if !is_square(&even) || !is_square(&odd) {
-            return None;
+            return false;
         }
-        let mut pairs = Vec::new();
         for (low, &high) in mirrored.iter().enumerate() {
             if low < high {
-                pairs.push([low, high]);
+                self.pairs.push([start + low, start + high]);
             }
         }
-        Some(Self { pairs, even, odd })
+        let middle = start + even.len();
+        self.add(start, even);
+        self.add(middle, odd);
+        true
     }
+}
+
+/// Columns with their numbers.
+type Columns = Vec<(usize, Vec<f64>)>;
+
+/// Column `m` of a matrix of `n` rows, given row by row.
+fn column(n: usize, matrix: &[f64], m: usize) -> Vec<f64> {
+    matrix.chunks(n).map(|row| row[m]).collect()
 }
 
 /// Whether a column is `sign` times its mirror image.

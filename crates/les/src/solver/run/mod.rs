@@ -138,15 +138,6 @@ pub struct Silent;
 
 impl RunObserver for Silent {}
 
-/// Wall time that a run has spent in steps.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Stepping {
-    /// All of it \[s\].
-    pub wall_s: f64,
-    /// In exchanges between ranks, waiting for them included \[s\].
-    pub exchange_s: f64,
-}
-
 /// A simulation with its plan.
 #[derive(Debug)]
 pub struct Run {
@@ -156,7 +147,8 @@ pub struct Run {
     has_warned_of_energy: bool,
     has_warned_of_growth: bool,
     is_fresh: bool,
-    stepping: Stepping,
+    steps_wall_s: f64,
+    exchange_wall_s: f64,
 }
 
 /// What a run remembers of its steps, and keeps in its checkpoints beside the flow.
@@ -219,7 +211,8 @@ impl Run {
             has_warned_of_energy: false,
             has_warned_of_growth: false,
             is_fresh,
-            stepping: Stepping::default(),
+            steps_wall_s: 0.0,
+            exchange_wall_s: 0.0,
         }
     }
 
@@ -228,9 +221,14 @@ impl Run {
         &self.flow
     }
 
-    /// What the steps of this run have taken so far.
-    pub fn stepping(&self) -> Stepping {
-        self.stepping
+    /// Wall time that the steps of this run have taken so far \[s\].
+    pub fn steps_wall_s(&self) -> f64 {
+        self.steps_wall_s
+    }
+
+    /// Part of it in exchanges between ranks, waiting for them included \[s\].
+    pub fn exchange_wall_s(&self) -> f64 {
+        self.exchange_wall_s
     }
 
     /// The plan.
@@ -314,8 +312,8 @@ impl Run {
         let started = Instant::now();
         let exchanged_s = self.flow.layout.slabs.ranks.spent_s();
         let report = self.flow.step_towards(target_s)?;
-        self.stepping.wall_s += started.elapsed().as_secs_f64();
-        self.stepping.exchange_s += self.flow.layout.slabs.ranks.spent_s() - exchanged_s;
+        self.steps_wall_s += started.elapsed().as_secs_f64();
+        self.exchange_wall_s += self.flow.layout.slabs.ranks.spent_s() - exchanged_s;
         Ok(report)
     }
 
