@@ -28,11 +28,11 @@ const OTHER: &str = "it is no NetCDF file; classic NetCDF is needed, from xarray
 /// What is said of a file that the library does not read: its own words would tell bytes of a file that may be anything.
 const UNSOUND: &str =
     "it is no sound NetCDF file: its header is damaged, or counts more than the file holds";
-const UNSOUND_HDF5: &str = "it is NetCDF-4 (HDF5), but damaged or of a kind that is not read: nccopy -k cdf2 in.nc out.nc makes classic \
+const UNSOUND_HDF5: &str = "it is NetCDF-4 (HDF5), but damaged or of a kind that is not read: nccopy -k nc6 in.nc out.nc makes classic \
                             NetCDF of it";
 /// How NetCDF-4 becomes classic, for programs that do not read it.
-#[cfg_attr(feature = "netcdf4", allow(dead_code))]
-const CONVERT: &str = "it is NetCDF-4 (HDF5), classic NetCDF is needed: nccopy -k cdf2 in.nc out.nc, or in xarray \
+#[cfg(not(feature = "netcdf4"))]
+const CONVERT: &str = "it is NetCDF-4 (HDF5), classic NetCDF is needed: nccopy -k nc6 in.nc out.nc, or in xarray \
                        to_netcdf(\"out.nc\", format=\"NETCDF3_64BIT\")";
 
 /// What a dimension is for: its name here, its letter in the attribute `axis`, and other names for it.
@@ -125,18 +125,6 @@ pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
     let file = NcFile::open(path).ok();
     let file = file.ok_or_else(unsound)?;
     let root = file.root_group().map_err(|_| unsound())?;
-    // The library holds only records against the length of the file.
-    let end_of = |v: &NcVariable| {
-        v.data_offset.checked_add(
-            v.num_elements()
-                .ok()?
-                .checked_mul(v.dtype.size().ok()? as u64)?,
-        )
-    };
-    let is_cut = |v: &NcVariable| !v.is_record_var && end_of(v).is_none_or(|end| end > bytes);
-    if beginning[0] == b'C' && root.variables.iter().any(is_cut) {
-        return Err(unsound());
-    }
     let (variables, attributes) = (root.variables.clone(), root.attributes.clone());
     Ok(NetcdfFile {
         path: path.to_owned(),
