@@ -33,7 +33,7 @@ mod wakes;
 mod work_precision;
 mod workspace;
 
-use clap::{Parser, Subcommand};
+use clap::Parser;
 use figures::context::Context;
 use fixtures::failure::Outcome;
 use profile::Profile;
@@ -45,12 +45,6 @@ use std::path::PathBuf;
     bin_name = "cargo xtask",
     about = "Tasks of the wakescope workspace"
 )]
-struct Cli {
-    #[command(subcommand)]
-    task: Task,
-}
-
-#[derive(Debug, Subcommand)]
 enum Task {
     /// Draw the figures, measure the claims, write the report.
     ReproduceFigs {
@@ -184,7 +178,7 @@ fn run(task: Task) -> Outcome {
 }
 
 fn main() -> std::process::ExitCode {
-    let result = run(Cli::parse().task);
+    let result = run(Task::parse());
     if let Err(failure) = result {
         eprintln!("error: {failure}");
         return std::process::ExitCode::from(2);

@@ -102,11 +102,11 @@ impl Run<'_> {
         self.bar.set_message(figure.id);
         // The key of the cache knows nothing of a wake from elsewhere.
         let is_other = self.context.wake.is_some();
-        let place = cache::Place::new(figure.id, self.context)?;
+        let folder = cache::folder(figure.id, self.context)?;
         let cached = if self.context.anew || is_other {
             None
         } else {
-            place.load()
+            cache::load(figure.id, &folder)
         };
         let note = if cached.is_some() { " (cached)" } else { "" };
         let rendered = match cached {
@@ -114,7 +114,7 @@ impl Run<'_> {
             None => {
                 let rendered = make(figure, self.context, pool)?;
                 if !is_other {
-                    place.store(&rendered)?;
+                    cache::store(figure.id, &folder, &rendered)?;
                 }
                 rendered
             }

@@ -116,36 +116,18 @@ impl ScanErrors {
     }
 }
 
-/// Which fit of a scan is evaluated.
-#[derive(Clone, Copy)]
-enum Rule {
-    /// That of the pair.
-    Pair,
-    /// That with secondary vortices if the scan shows them.
-    Observed,
-    /// That with secondary vortices.
-    Four,
-}
-
-impl Rule {
-    const ALL: [Self; 3] = [Self::Pair, Self::Observed, Self::Four];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Pair => "a pair alone",
-            Self::Observed => "by the rule",
-            Self::Four => "always four",
+/// Rules by which a fit of a scan is chosen.
+const RULES: [(&str, fn(&ScanErrors) -> &[Errors]); 3] = [
+    ("a pair alone", |scan| &scan.pair),
+    ("by the rule", |scan| {
+        if scan.shows_secondary {
+            &scan.four
+        } else {
+            &scan.pair
         }
-    }
-
-    fn errors(self, scan: &ScanErrors) -> &[Errors] {
-        match self {
-            Self::Pair => &scan.pair,
-            Self::Observed if !scan.shows_secondary => &scan.pair,
-            Self::Observed | Self::Four => &scan.four,
-        }
-    }
-}
+    }),
+    ("always four", |scan| &scan.four),
+];
 
 /// A number between two, uniformly distributed.
 fn draw_within(rng: &mut Xoshiro256PlusPlus, [least, most]: [f64; 2]) -> f64 {
@@ -363,11 +345,15 @@ fn pair_of_scene(kind: &WakeKind, seed: u64) -> Flow {
     })
 }
 
-/// Mean over the vortices of each scan of a number of their errors.
-fn means(scans: &[ScanErrors], rule: Rule, number: fn(&Errors) -> f64) -> Vec<f64> {
+/// Mean over the vortices of each scan of a number of the errors of the chosen fit.
+fn means(
+    scans: &[ScanErrors],
+    chosen: fn(&ScanErrors) -> &[Errors],
+    number: fn(&Errors) -> f64,
+) -> Vec<f64> {
     let mut means = Vec::new();
     for scan in scans {
-        let numbers: Vec<f64> = rule.errors(scan).iter().map(number).collect();
+        let numbers: Vec<f64> = chosen(scan).iter().map(number).collect();
         means.push(mean(&numbers, None));
     }
     means
@@ -380,14 +366,13 @@ fn print(name: &str, scans: &[ScanErrors]) {
     if scans.len() < 2 {
         return;
     }
-    for rule in Rule::ALL {
-        let bias = Estimate::mean(&means(scans, rule, |e| e.circulation_percent));
-        let squares = means(scans, rule, |e| e.circulation_percent.powi(2));
-        let deviations = means(scans, rule, |e| e.circulation_deviations.powi(2));
-        let lateral = means(scans, rule, |e| e.lateral_m.powi(2));
+    for (rule, chosen) in RULES {
+        let bias = Estimate::mean(&means(scans, chosen, |e| e.circulation_percent));
+        let squares = means(scans, chosen, |e| e.circulation_percent.powi(2));
+        let deviations = means(scans, chosen, |e| e.circulation_deviations.powi(2));
+        let lateral = means(scans, chosen, |e| e.lateral_m.powi(2));
         println!(
-            "  {}: Gamma_5-15 {:6.1} +- {:.1} %, root mean square {:5.1} %, {:4.1} standard deviations; lateral {:4.1} m",
-            rule.name(),
+            "  {rule}: Gamma_5-15 {:6.1} +- {:.1} %, root mean square {:5.1} %, {:4.1} standard deviations; lateral {:4.1} m",
             bias.value,
             bias.standard_error,
             mean(&squares, None).sqrt(),

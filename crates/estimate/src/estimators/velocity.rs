@@ -113,7 +113,6 @@ impl GateVelocity {
 
 /// How the peak is placed between the frequencies of the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[non_exhaustive]
 pub enum Refinement {
     /// Parabola through the logarithm of the highest bin and its neighbours.
     #[default]

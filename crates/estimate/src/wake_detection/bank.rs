@@ -45,12 +45,9 @@ impl Default for DetectorOptions {
     }
 }
 
-/// A wake of the bank: the places of its vortices, none where there is no such vortex.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Template {
-    pub(super) left: Option<usize>,
-    pub(super) right: Option<usize>,
-}
+/// A wake of the bank: the places of its left and its right vortex, none where there is no such
+/// vortex.
+pub(super) type Template = [Option<usize>; 2];
 
 /// Places and wakes.
 #[derive(Debug, Clone)]
@@ -113,20 +110,11 @@ impl Bank {
         for ((row, column), &place) in index.indexed_iter() {
             let Some(place) = place else { continue };
             if options.single_vortices {
-                templates.push(Template {
-                    left: Some(place),
-                    right: None,
-                });
-                templates.push(Template {
-                    left: None,
-                    right: Some(place),
-                });
+                templates.push([Some(place), None]);
+                templates.push([None, Some(place)]);
             }
             let partners = (least..=most).filter_map(|away| *index.get((row, column + away))?);
-            templates.extend(partners.map(|partner| Template {
-                left: Some(place),
-                right: Some(partner),
-            }));
+            templates.extend(partners.map(|partner| [Some(place), Some(partner)]));
         }
         Self {
             places_m,
@@ -223,10 +211,9 @@ mod tests {
             0.3 * step_m,
             &DetectorOptions::default(),
         );
-        let pairs = bank
-            .templates
-            .iter()
-            .filter_map(|t| Some(bank.places_m[t.right?].0 - bank.places_m[t.left?].0));
+        let pairs = bank.templates.iter().filter_map(|[left, right]| {
+            Some(bank.places_m[(*right)?].0 - bank.places_m[(*left)?].0)
+        });
         let (least, most) = pairs.fold((f64::INFINITY, 0.0_f64), |(least, most), b| {
             (least.min(b), most.max(b))
         });

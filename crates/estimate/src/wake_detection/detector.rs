@@ -150,9 +150,9 @@ impl WakeDetector {
         let length = self.reciprocal_length[best];
         let template = &self.bank.templates[best];
         let mut left = white;
-        for (place, sense) in [(template.left, -1.0), (template.right, 1.0)] {
+        for (place, sense) in template.iter().zip([-1.0, 1.0]) {
             let Some(place) = place else { continue };
-            left.scaled_add(-sense * value.sqrt() * length, &self.shapes.row(place));
+            left.scaled_add(-sense * value.sqrt() * length, &self.shapes.row(*place));
         }
         let [along, across] = self.neighbour_correlation(&left, template);
         Ok(WakeStatistic {
@@ -203,10 +203,10 @@ impl WakeDetector {
             f64::NAN,
         );
         for (cell, number) in self.cells.cells.iter().zip(numbers) {
-            let mut centres = [template.left, template.right]
-                .into_iter()
+            let mut centres = template
+                .iter()
                 .flatten()
-                .map(|place| self.bank.places_m[place]);
+                .map(|place| self.bank.places_m[*place]);
             if centres.all(|(y, z)| (y - cell.place_m.0).hypot(z - cell.place_m.1) > WAKE_M) {
                 grid[[cell.line, cell.gate]] = *number;
             }
@@ -244,9 +244,9 @@ impl WakeDetector {
 
     /// How well each wake of the bank explains a scan, given its products with all places; the statistic is the square of the largest.
     pub(super) fn scores(&self, products: ArrayView1<'_, f64>) -> impl Iterator<Item = f64> {
-        let score = move |(template, length): (&Template, &f64)| {
+        let score = move |(&[left, right], length): (&Template, &f64)| {
             let of = |place: Option<usize>| place.map_or(0.0, |place| products[place]);
-            (of(template.right) - of(template.left)) * length
+            (of(right) - of(left)) * length
         };
         self.bank
             .templates
@@ -269,8 +269,8 @@ impl WakeDetector {
         (self.shapes.dot(&white), white.dot(&white).sqrt())
     }
 
-    fn wake(&self, template: &Template, circulation_m2_s: f64) -> Wake {
-        let other = template.left.or(template.right).unwrap_or(0);
+    fn wake(&self, &[left, right]: &Template, circulation_m2_s: f64) -> Wake {
+        let other = left.or(right).unwrap_or(0);
         let vortex = |place: Option<usize>, sense: f64| {
             let (lateral_m, height_m) = self.bank.places_m[place.unwrap_or(other)];
             let (away_m, circulation_m2_s) = place
@@ -283,7 +283,7 @@ impl WakeDetector {
                 self.bank.core_m,
             )
         };
-        Wake::calm(vortex(template.left, -1.0), vortex(template.right, 1.0))
+        Wake::calm(vortex(left, -1.0), vortex(right, 1.0))
     }
 }
 
@@ -338,8 +338,7 @@ fn remove(basis: &Array2<f64>, columns: &mut Array2<f64>) {
 }
 
 /// Square of the length of what a wake of unit circulation shows, from the products of single vortices.
-fn length2(template: &Template, gram: &Array2<f64>) -> f64 {
+fn length2(&[left, right]: &Template, gram: &Array2<f64>) -> f64 {
     let of = |a: Option<usize>, b: Option<usize>| a.zip(b).map_or(0.0, |(a, b)| gram[[a, b]]);
-    let (left, right) = (template.left, template.right);
     of(left, left) + of(right, right) - 2.0 * of(left, right)
 }

@@ -2,23 +2,13 @@
 
 use crate::error::{Error, check};
 
-/// The wind from four beams.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SwungWind {
-    /// Wind along the first beam and along the second, horizontally \[m/s\].
-    pub horizontal_m_s: [f64; 2],
-    /// Vertical wind from the sum of the four \[m/s\].
-    pub vertical_m_s: f64,
-    /// Standard deviations of these three for radial velocities of standard deviation 1.
-    pub unit_deviation: [f64; 3],
-}
-
 /// The wind from radial velocities \[m/s\], positive away from the lidar, of beams at azimuths 0, 90, 180 and 270 degrees and one
-/// elevation \[rad\]: `(N - S)/(2 cos el)`, `(E - W)/(2 cos el)`, `(N + E + S + W)/(4 sin el)`.
+/// elevation \[rad\]: `(N - S)/(2 cos el)`, `(E - W)/(2 cos el)`, `(N + E + S + W)/(4 sin el)`: along the first
+/// beam and along the second, horizontally, and vertically \[m/s\].
 ///
 /// # Errors
 /// [`Error::OutOfRange`] for an elevation that is not between 0 and a quarter turn.
-pub fn swing(elevation_rad: f64, [north, east, south, west]: [f64; 4]) -> Result<SwungWind, Error> {
+pub fn swing(elevation_rad: f64, [north, east, south, west]: [f64; 4]) -> Result<[f64; 3], Error> {
     let (sin, cos) = elevation_rad.sin_cos();
     let slanted = elevation_rad > 0.0 && elevation_rad < std::f64::consts::FRAC_PI_2;
     check(
@@ -27,9 +17,9 @@ pub fn swing(elevation_rad: f64, [north, east, south, west]: [f64; 4]) -> Result
         "between 0 and pi/2",
         slanted,
     )?;
-    Ok(SwungWind {
-        horizontal_m_s: [0.5 * (north - south) / cos, 0.5 * (east - west) / cos],
-        vertical_m_s: 0.25 * (north + east + south + west) / sin,
-        unit_deviation: [0.5f64.sqrt() / cos, 0.5f64.sqrt() / cos, 0.5 / sin],
-    })
+    Ok([
+        0.5 * (north - south) / cos,
+        0.5 * (east - west) / cos,
+        0.25 * (north + east + south + west) / sin,
+    ])
 }

@@ -8,4 +8,4 @@ mod beam_fit;
 mod beam_swinging;
 
 pub use beam_fit::{WindFit, fit_wind};
-pub use beam_swinging::{SwungWind, swing};
+pub use beam_swinging::swing;

@@ -24,19 +24,6 @@ const LARGEST_LOSS: f64 = 0.04;
 /// Fresnel number below which the whole path is in the far field of the aperture.
 const FAR_FIELD: f64 = 0.2;
 
-/// Spacings that turbulence and aperture accept, and the largest to plan with \[m\].
-struct Spacings {
-    aperture_m: f64,
-    scatter_m: f64,
-    planned_m: f64,
-}
-
-/// Violations of a grid by a run, and the forecast of the light that its border absorbs.
-pub(super) struct Verdict {
-    pub(super) violations: Vec<Violation>,
-    pub(super) light_lost: f64,
-}
-
 /// A case with what its limits need, computed once.
 pub(super) struct Limits<'a> {
     pub(super) case: &'a Case,
@@ -106,41 +93,46 @@ impl<'a> Limits<'a> {
         ))
     }
 
-    /// Limits of turbulence and aperture on the spacing, beside those of the beam on any grid
-    /// ([`beam_limits_m`]).
+    /// Spacings that resolve the beam at these ranges \[m\]: the largest to plan with, and the
+    /// largest that is accepted.
     ///
     /// If every range is in the far field, the pattern at the target is that of the aperture's few
     /// lowest waves, and a sixth of the points give the efficiency as well (within 1e-4 in free
-    /// space). For the angles into which focus, tilt and turbulence send the beam the plan has a
-    /// margin of two; the monitored border covers what lies within it.
-    fn spacings(&self, range_m: &[f64]) -> Result<Spacings, Error> {
+    /// space).
+    fn aperture_spacings_m(&self, range_m: &[f64]) -> [f64; 2] {
+        let telescope = &self.case.telescope;
+        let fresnel = range_m
+            .iter()
+            .fold(0f64, |worst, &r| worst.max(fresnel_number(telescope, r)));
+        let points = if fresnel < FAR_FIELD {
+            [4.0, 3.0]
+        } else {
+            [25.0, 12.5]
+        };
+        points.map(|points| telescope.aperture_radius_m / points)
+    }
+
+    /// Largest spacing that holds the angles into which focus, tilt and turbulence send the beam
+    /// \[m\]. A plan has a margin of two; the monitored border covers what lies within it.
+    fn scatter_spacing_m(&self, range_m: &[f64]) -> Result<f64, Error> {
         let Case {
             telescope,
             misalignment,
             turbulence,
             ..
         } = self.case;
-        let a = telescope.aperture_radius_m;
-        let lambda = telescope.wavelength_m;
-        let fresnel = range_m
-            .iter()
-            .fold(0f64, |worst, &r| worst.max(fresnel_number(telescope, r)));
-        let [planned, accepted] = if fresnel < FAR_FIELD {
-            [4.0, 3.0]
-        } else {
-            [25.0, 12.5]
-        };
         let scatter = scatter_rad(telescope, &turbulence.cn2, last(range_m)?)?;
         let slope = (slope_rad(telescope, misalignment) + 2.0 * scatter).max(1e-30);
-        Ok(Spacings {
-            aperture_m: a / accepted,
-            scatter_m: lambda / slope,
-            planned_m: (a / planned).min(0.5 * lambda / slope),
-        })
+        Ok(telescope.wavelength_m / slope)
     }
 
-    /// Examines a grid for these ranges.
-    pub(super) fn verdict(&self, grid: &Grid, range_m: &[f64]) -> Result<Verdict, Error> {
+    /// Violations of a grid by a run to these ranges, and the forecast of the fraction of the light
+    /// that its border absorbs.
+    pub(super) fn examine(
+        &self,
+        grid: &Grid,
+        range_m: &[f64],
+    ) -> Result<(Vec<Violation>, f64), Error> {
         let grid = grid.validated()?;
         let Case {
             telescope,
@@ -150,9 +142,9 @@ impl<'a> Limits<'a> {
         } = self.case;
         let mut limits_m = beam_limits_m(telescope, misalignment, last(range_m)?).to_vec();
         if !turbulence.cn2.is_none() {
-            let spacings = self.spacings(range_m)?;
-            limits_m.push((Limit::Aperture, spacings.aperture_m));
-            limits_m.push((Limit::Scatter, spacings.scatter_m));
+            let [_, accepted_m] = self.aperture_spacings_m(range_m);
+            limits_m.push((Limit::Aperture, accepted_m));
+            limits_m.push((Limit::Scatter, self.scatter_spacing_m(range_m)?));
         }
         let light = self.light(range_m)?;
         let spacing_m = grid.largest_spacing_m();
@@ -160,21 +152,18 @@ impl<'a> Limits<'a> {
         if light_lost > LARGEST_LOSS {
             limits_m.push((Limit::Light, light.width_m(LARGEST_LOSS, spacing_m)));
         }
-        Ok(Verdict {
-            violations: violations_of(&limits_m, grid.largest_spacing_m(), grid.smallest_width_m()),
-            light_lost,
-        })
+        let violations =
+            violations_of(&limits_m, grid.largest_spacing_m(), grid.smallest_width_m());
+        Ok((violations, light_lost))
     }
 
     /// A grid for these ranges. Its spacing is the one to plan with, or else the largest that is
     /// accepted; its border absorbs [`DERIVED_LOSS`] at most, or else [`LARGEST_LOSS`].
     pub(super) fn grid(&self, range_m: &[f64]) -> Result<Grid, Error> {
-        let Spacings {
-            aperture_m,
-            scatter_m,
-            mut planned_m,
-        } = self.spacings(range_m)?;
-        let accepted_m = aperture_m.min(scatter_m);
+        let [planned_m, accepted_m] = self.aperture_spacings_m(range_m);
+        let scatter_m = self.scatter_spacing_m(range_m)?;
+        let mut planned_m = planned_m.min(0.5 * scatter_m);
+        let accepted_m = accepted_m.min(scatter_m);
         let light = self.light(range_m)?;
         // Half the inner scale if that costs no more than a factor of two.
         let Turbulence { spectrum, cn2 } = &self.case.turbulence;
@@ -236,8 +225,8 @@ impl<'a> Limits<'a> {
         let grid = self.grid(&all).ok()?;
         let layers = self.equal_layers(runs).ok()??;
         for range_m in runs {
-            let verdict = self.verdict(&grid, range_m).ok()?;
-            if !verdict.violations.is_empty() {
+            let (violations, _) = self.examine(&grid, range_m).ok()?;
+            if !violations.is_empty() {
                 return None;
             }
         }

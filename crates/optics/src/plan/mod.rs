@@ -214,9 +214,9 @@ impl Limits<'_> {
         let mut light_lost = Vec::new();
         for range_m in &all {
             crate::efficiency::check_increasing("range_m", range_m)?;
-            let verdict = self.verdict(grid, range_m)?;
-            violations.extend(verdict.violations);
-            light_lost.push(verdict.light_lost);
+            let (of_run, lost) = self.examine(grid, range_m)?;
+            violations.extend(of_run);
+            light_lost.push(lost);
         }
         if !violations.is_empty() {
             return Err(Error::Sampling {

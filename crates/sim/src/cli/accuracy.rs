@@ -6,40 +6,30 @@ use super::words::FolderWords;
 use crate::Error;
 use crate::accuracy::{Report, Request};
 use crate::flow::WakePreset;
-use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::Path;
 
-/// Arguments of `wakescope accuracy`.
-#[derive(Debug, Args)]
-pub(super) struct AccuracyArgs {
-    /// Scene file, or case file of a flow or wake.
-    #[arg(required_unless_present = "preset")]
-    scene: Option<PathBuf>,
-    /// Wake preset; a case file overrides its keys.
-    #[arg(long, value_enum)]
-    preset: Option<WakePreset>,
-    #[command(flatten)]
-    request: Request,
-    #[command(flatten)]
-    folder: FolderWords,
-}
-
+/// Reports on a scene, or on the case file of a flow or wake, whose keys override those of a preset.
 /// Returns the exit code: 1 where a setting has no value within the error.
-pub(super) fn accuracy(args: &AccuracyArgs, cli: &Cli) -> Result<u8, Error> {
-    let prepare = || args.folder.prepare(cli, |files| Report::list(None, files));
-    let path = args.scene.as_deref();
-    let scene = path.filter(|path| args.preset.is_none() && !cli.is_case(path));
+pub(super) fn accuracy(
+    path: Option<&Path>,
+    preset: Option<WakePreset>,
+    request: &Request,
+    folder: &FolderWords,
+    cli: &Cli,
+) -> Result<u8, Error> {
+    let prepare = || folder.prepare(cli, |files| Report::list(None, files));
+    let scene = path.filter(|path| preset.is_none() && !cli.is_case(path));
     let report = match scene {
         Some(path) => {
             let file = cli.scene(path)?;
             prepare()?;
-            Report::of_scene(&file, &args.request, &*cli.observer())?
+            Report::of_scene(&file, request, &*cli.observer())?
         }
         None => {
-            let file = seeded(case_file(path, args.preset, cli)?, cli)?;
+            let file = seeded(case_file(path, preset, cli)?, cli)?;
             prepare()?;
-            Report::of_case(&file, &args.request, &*cli.observer())?
+            Report::of_case(&file, request, &*cli.observer())?
         }
     };
     let cheapest = report.cheapest();
@@ -55,7 +45,7 @@ pub(super) fn accuracy(args: &AccuracyArgs, cli: &Cli) -> Result<u8, Error> {
         "notes": report.notes,
     });
     object[format!("{}_hash", report.subject)] = json!(report.provenance.scene_hash);
-    args.folder.finish(
+    folder.finish(
         cli,
         (Default::default(), report.provenance.clone()),
         |files| Report::list(Some(&report), files),

@@ -5,12 +5,21 @@ use crate::io::Existing;
 use crate::measure::bound::{bound as of_plan, points};
 use crate::measure::budget::{Budget, scan_ranges_m};
 use crate::outputs::Outputs;
-use crate::plan::Plan;
+use crate::plan::{Plan, Target};
 use crate::setup::progress::Silent;
 use crate::{Error, scene};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// The plan of the map of a scene, whose bound fits into the memory of the machine.
+pub(super) fn plan(scene: &Path, allow_large: bool, cli: &Cli) -> Result<Plan, Error> {
+    let plan = Plan::new(cli.scene(scene)?, Target::Map)?;
+    if !allow_large {
+        plan.bound_fits()?;
+    }
+    Ok(plan)
+}
 
 /// Prints the bound of a plan and writes its table to a file, if there is one.
 pub(super) fn bound(
@@ -37,15 +46,16 @@ pub(super) fn bound(
     cli.say(&object, &text)
 }
 
-/// Prints the budget of a plan at some ranges, m, or those of its scan, and writes its table to a
+/// Prints the budget of a scene at some ranges, m, or those of its scan, and writes its table to a
 /// folder, if there is one.
 pub(super) fn budget(
-    plan: &Plan,
+    scene: &Path,
     range_m: &[f64],
     out: Option<&Path>,
     overwrite: bool,
     cli: &Cli,
 ) -> Result<(), Error> {
+    let plan = Plan::new(cli.scene(scene)?, Target::Efficiency)?;
     let existing = Existing::with_overwrite(overwrite);
     if let Some(folder) = out {
         cli.prepare(folder, &["budget.csv".into()], existing)?;
@@ -55,7 +65,7 @@ pub(super) fn budget(
     } else {
         range_m.to_vec()
     };
-    let found = Budget::new(plan, &ranges_m, &*cli.observer())?;
+    let found = Budget::new(&plan, &ranges_m, &*cli.observer())?;
     let mut text = found.text();
     let mut files = Vec::new();
     if let Some(folder) = out {

@@ -4,7 +4,7 @@
 //! Check: the files that are kept are those that the command writes, byte for byte.
 
 use super::output::{as_object, explained, print};
-use super::progress::{Bars, Quiet};
+use super::progress::Bars;
 use super::{Cli, dispatch, with_threads};
 use crate::Error;
 use crate::flow::{CaseFile, WakePreset};
@@ -118,8 +118,7 @@ impl Cli {
     pub(super) fn observer(&self) -> Arc<dyn Observer + Send> {
         match &self.call {
             Some(call) => call.host.observer.clone(),
-            None if self.quiet => Arc::new(Quiet),
-            None => Arc::new(Bars::new()),
+            None => Arc::new(Bars::new(self.quiet)),
         }
     }
 

@@ -118,9 +118,34 @@ enum Command {
     /// Whether scans hold a wake, at a rate of false alarms; the smallest circulation that is found.
     Detect(detect::DetectWords),
     /// Run many scenes that differ in some keys: a table and pictures of what each gives.
-    Sweep(sweep::SweepWords),
+    Sweep {
+        /// The scene that all cases begin with.
+        #[arg(required_unless_present = "merge")]
+        scene: Option<PathBuf>,
+        #[command(flatten)]
+        request: crate::sweep::Request,
+        /// Run nothing: make the tables from the results in these folders.
+        #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "resume"])]
+        merge: Vec<PathBuf>,
+        #[command(flatten)]
+        settings: crate::sweep::Settings,
+        /// Folder to write to; made if it does not exist.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
     /// Numerical error and run time of a scene or flow, setting by setting.
-    Accuracy(accuracy::AccuracyArgs),
+    Accuracy {
+        /// Scene file, or case file of a flow or wake.
+        #[arg(required_unless_present = "preset")]
+        scene: Option<PathBuf>,
+        /// Wake preset; a case file overrides its keys.
+        #[arg(long, value_enum)]
+        preset: Option<WakePreset>,
+        #[command(flatten)]
+        request: crate::accuracy::Request,
+        #[command(flatten)]
+        folder: FolderWords,
+    },
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
     Flow {
         /// The case file; --example prints one.
@@ -197,7 +222,12 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
 
 fn dispatch(cli: &Cli) -> Result<u8, Error> {
     match &cli.command {
-        Command::Accuracy(args) => return accuracy::accuracy(args, cli),
+        Command::Accuracy {
+            scene,
+            preset,
+            request,
+            folder,
+        } => return accuracy::accuracy(scene.as_deref(), *preset, request, folder, cli),
         Command::Init {
             scene,
             force,
@@ -216,10 +246,7 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
             overwrite,
             allow_large,
         } => {
-            let plan = Plan::new(cli.scene(scene)?, Target::Map)?;
-            if !allow_large {
-                plan.bound_fits()?;
-            }
+            let plan = bound::plan(scene, *allow_large, cli)?;
             bound::bound(&plan, out.as_deref(), *overwrite, cli)
         }
         Command::Budget {
@@ -227,12 +254,18 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
             range,
             out,
             overwrite,
-        } => {
-            let plan = Plan::new(cli.scene(scene)?, Target::Efficiency)?;
-            bound::budget(&plan, range, out.as_deref(), *overwrite, cli)
-        }
+        } => bound::budget(scene, range, out.as_deref(), *overwrite, cli),
         Command::Detect(words) => detect::detect(words, cli),
-        Command::Sweep(words) => sweep::sweep(words, cli),
+        Command::Sweep {
+            scene,
+            request,
+            merge,
+            settings,
+            out,
+        } => {
+            let cases = sweep::cases(scene.as_deref(), request, cli)?;
+            sweep::sweep(cases.as_ref(), merge, out, *settings, cli)
+        }
         Command::Flow { case, run, example } => {
             flow::flow(example.as_deref(), case.as_deref(), run, cli)
         }
@@ -378,6 +411,6 @@ fn plan_json(plan: &Plan) -> Value {
     let stages: Vec<Value> = stages.collect();
     json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.content.seed,
-        "scan": plan.schedule(), "stages": stages, "core_s": plan.core_s, "memory_bytes": plan.total().memory_bytes, "warnings": plan.warnings,
+        "scan": plan.schedule(), "stages": stages, "core_s": plan.core_s, "memory_bytes": plan.memory_bytes(), "warnings": plan.warnings,
     })
 }

@@ -6,19 +6,22 @@ use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use std::io::Write as _;
 use std::sync::Mutex;
 
-/// The bar of the stage that runs; those of its parts are hidden.
+/// The bar of the stage that runs; those of its parts are hidden, and all of a quiet run, which
+/// shows warnings alone.
 pub(super) struct Bars {
+    is_quiet: bool,
     style: ProgressStyle,
     stages: Mutex<Vec<ProgressBar>>,
 }
 
 impl Bars {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(is_quiet: bool) -> Self {
         let template =
             "  {prefix:<16} [{bar:32}] {percent:>3} %  {elapsed} gone, {eta} left  {msg}";
         let style =
             ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         Self {
+            is_quiet,
             style: style.progress_chars("=> "),
             stages: Mutex::default(),
         }
@@ -35,12 +38,14 @@ impl Bars {
 
 impl Observer for Bars {
     fn forecast(&self, text: &str) {
-        let _ = write!(std::io::stderr(), "{text}");
+        if !self.is_quiet {
+            let _ = write!(std::io::stderr(), "{text}");
+        }
     }
 
     fn begin(&self, stage: Stage, steps: u64) {
         self.with(|stages| {
-            let bar = if stages.is_empty() {
+            let bar = if stages.is_empty() && !self.is_quiet {
                 ProgressBar::new(steps)
             } else {
                 ProgressBar::hidden()
@@ -77,17 +82,12 @@ impl Observer for Bars {
 
     fn warn(&self, text: &str) {
         self.with(|stages| match stages.first() {
-            Some(bar) => bar.suspend(|| Quiet.warn(text)),
-            None => Quiet.warn(text),
+            Some(bar) => bar.suspend(|| print_warning(text)),
+            None => print_warning(text),
         });
     }
 }
 
-/// Shows warnings and no progress.
-pub(super) struct Quiet;
-
-impl Observer for Quiet {
-    fn warn(&self, text: &str) {
-        let _ = writeln!(std::io::stderr(), "warning: {text}");
-    }
+fn print_warning(text: &str) {
+    let _ = writeln!(std::io::stderr(), "warning: {text}");
 }

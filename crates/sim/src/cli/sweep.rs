@@ -2,50 +2,40 @@
 
 use super::{Cli, paths};
 use crate::io::Existing;
-use crate::sweep::{Request, Settings, merge, run};
+use crate::sweep::{Request, Settings, Sweep, merge, run};
 use crate::{Error, sweep};
-use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Words of `wakescope sweep`.
-#[derive(Debug, Args)]
-pub(super) struct SweepWords {
-    /// The scene that all cases begin with.
-    #[arg(required_unless_present = "merge")]
-    scene: Option<PathBuf>,
-    #[command(flatten)]
-    request: Request,
-    /// Run nothing: make the tables from the results in these folders.
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "resume"])]
-    merge: Vec<PathBuf>,
-    #[command(flatten)]
-    settings: Settings,
-    /// Folder to write to; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-}
-
-pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
+/// The cases of a sweep over a scene, if there is one.
+pub(super) fn cases(
+    scene: Option<&Path>,
+    request: &Request,
+    cli: &Cli,
+) -> Result<Option<Sweep>, Error> {
     let request = Request {
         seed: cli.seed,
-        ..words.request.clone()
+        ..request.clone()
     };
-    let sweep = words
-        .scene
-        .as_deref()
-        .map(|scene| cli.sweep(scene, &request))
-        .transpose()?;
-    let Some(sweep) = sweep.as_ref().filter(|_| words.merge.is_empty()) else {
-        let existing = Existing::with_overwrite(words.settings.overwrite);
-        let files = merge(&words.merge, sweep.as_ref(), &words.out, existing)?;
-        let text = format!("wrote {} files to {}", files.len(), words.out.display());
-        return cli.say(
-            &json!({ "version": crate::VERSION, "files": paths(&files) }),
-            &text,
-        );
+    scene.map(|scene| cli.sweep(scene, &request)).transpose()
+}
+
+/// Runs the cases, or, if there are folders to merge, makes the tables from the results in these.
+pub(super) fn sweep(
+    cases: Option<&Sweep>,
+    folders: &[PathBuf],
+    out: &Path,
+    settings: Settings,
+    cli: &Cli,
+) -> Result<(), Error> {
+    let Some(sweep) = cases.filter(|_| folders.is_empty()) else {
+        let existing = Existing::with_overwrite(settings.overwrite);
+        let files = merge(folders, cases, out, existing)?;
+        let text = format!("wrote {} files to {}", files.len(), out.display());
+        let object = json!({ "version": crate::VERSION, "files": paths(&files) });
+        return cli.say(&object, &text);
     };
-    let summary = run(sweep, &words.out, words.settings, &*cli.observer())?;
+    let summary = run(sweep, out, settings, &*cli.observer())?;
     let sweep::Summary {
         run: ran,
         kept,
@@ -58,7 +48,7 @@ pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
         "{ran} cases run, {kept} kept; computed once for all that share them: flows {flows}, efficiency curves {efficiencies}, signals \
          {signals}\nwrote {} files and the folders of the cases to {}",
         files.len(),
-        words.out.display()
+        out.display()
     );
     let object = json!({
         "version": crate::VERSION, "sweep_hash": sweep.origin.scene_hash, "cases": sweep.cases.len(), "run": ran, "kept": kept,

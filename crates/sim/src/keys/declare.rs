@@ -243,7 +243,7 @@ macro_rules! second {
     };
 }
 
-/// Choices of another crate, by the names that they have in files.
+/// Choices of another crate, by the names that they have in files; each variant needs one.
 macro_rules! foreign_choices {
     ($($ty:ident { $($variant:ident = $word:literal),* $(,)? })*) => {
         $(impl $crate::keys::Declared for $ty {
@@ -255,10 +255,9 @@ macro_rules! foreign_choices {
                 }
             }
             fn to_value(&self) -> Option<toml::Value> {
-                $(if *self == Self::$variant {
-                    return Some(toml::Value::from($word));
-                })*
-                None
+                Some(match self {
+                    $(Self::$variant => $word.into(),)*
+                })
             }
         })*
     };

@@ -134,8 +134,7 @@ fn wind_of(
     let unknown = [f64::NAN; 3];
     match (pattern, seen_m_s) {
         (Pattern::Dbs { elevation_rad }, &[north, east, south, west, up]) => {
-            let swung = swing(*elevation_rad, [north, east, south, west])?;
-            let [along, across] = swung.horizontal_m_s;
+            let [along, across, _] = swing(*elevation_rad, [north, east, south, west])?;
             // From north and east to the axes of the scene: those of the first two beams.
             let horizontal = |d: usize| {
                 let unit = |beam: usize| direction[beam][d] / elevation_rad.cos();

@@ -3,7 +3,7 @@
 //! Check: a scene that needs far more than the machine has is refused with keys that, made smaller, are accepted.
 
 use super::sizes::Sizes;
-use super::stage::{Forecast, PlannedStage, total};
+use super::stage::{PlannedStage, largest_memory};
 use super::stages::of_bound;
 use super::units::bytes;
 use super::{Plan, Target};
@@ -88,10 +88,7 @@ fn hold(
     available_bytes: f64,
     smaller: impl Fn(Stage) -> String,
 ) -> Result<(), Error> {
-    let Forecast {
-        memory_bytes,
-        largest,
-    } = total(stages);
+    let (memory_bytes, largest) = largest_memory(stages);
     if memory_bytes <= SHARE * available_bytes {
         return Ok(());
     }
@@ -155,8 +152,7 @@ mod tests {
             plan(&format!(
                 "[scan]\npulses_per_line = {pulses}\n[outputs]\nnetcdf = false\n{more}"
             ))
-            .total()
-            .memory_bytes
+            .memory_bytes()
         };
         let (few, many) = (memory(100, ""), memory(1_000_000, ""));
         assert!(many < 1.01 * few && many < 2e8, "{few} {many}");
@@ -174,10 +170,10 @@ mod tests {
     fn a_single_gate_has_a_finite_forecast() {
         let plan = plan("[scan]\nelevation_max_rad = 0.0\nrange_max_m = 320.0\n");
         assert!(
-            plan.core_s.is_finite() && plan.total().memory_bytes.is_finite(),
+            plan.core_s.is_finite() && plan.memory_bytes().is_finite(),
             "{} {:?}",
             plan.core_s,
-            plan.total()
+            plan.memory_bytes()
         );
     }
 

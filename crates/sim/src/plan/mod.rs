@@ -28,7 +28,7 @@ mod warnings;
 
 pub use crate::setup::progress::Stage;
 pub use schedule::ScanSchedule;
-pub use stage::{Forecast, PlannedStage, Target};
+pub use stage::{PlannedStage, Target};
 
 /// What a run will do.
 #[derive(Debug)]
@@ -99,9 +99,9 @@ impl Plan {
         made().map_err(|error| file.of_key(error))
     }
 
-    /// Memory of the whole, with the threads of the pool in which it was planned.
-    pub fn total(&self) -> Forecast {
-        stage::total(&self.stages)
+    /// Largest memory held at once, with the threads of the pool in which it was planned, bytes.
+    pub fn memory_bytes(&self) -> f64 {
+        stage::largest_memory(&self.stages).0
     }
 
     /// Whether a stage runs.
@@ -154,7 +154,7 @@ impl fmt::Display for Plan {
         }
         let (time, memory) = (
             units::seconds(self.core_s),
-            units::bytes(self.total().memory_bytes),
+            units::bytes(self.memory_bytes()),
         );
         writeln!(
             f,
@@ -237,7 +237,7 @@ mod tests {
                 .num_threads(threads)
                 .build()
                 .unwrap();
-            pool.install(|| plan(Target::Run, of).total().memory_bytes)
+            pool.install(|| plan(Target::Run, of).memory_bytes())
         };
         let screens = |s: &mut Scene| {
             let t = RefractiveTurbulence {

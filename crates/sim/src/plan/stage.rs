@@ -33,15 +33,6 @@ pub struct PlannedStage {
     pub kept_bytes: f64,
 }
 
-/// Memory of a whole run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Forecast {
-    /// Largest memory held at once, bytes.
-    pub memory_bytes: f64,
-    /// The stage in which it is held.
-    pub largest: Option<Stage>,
-}
-
 /// A stage that runs, and the memory that it works with and keeps.
 pub(super) fn run(
     stage: Stage,
@@ -68,23 +59,20 @@ pub(super) fn skip(stage: Stage, reason: &str) -> PlannedStage {
     }
 }
 
-/// Memory of stages that run one after another.
-pub(super) fn total(stages: &[PlannedStage]) -> Forecast {
-    let mut forecast = Forecast {
-        memory_bytes: 0.0,
-        largest: None,
-    };
+/// Largest memory, bytes, that stages which run one after another hold at once, and the stage that
+/// holds it.
+pub(super) fn largest_memory(stages: &[PlannedStage]) -> (f64, Option<Stage>) {
+    let mut largest_bytes = 0.0;
+    let mut largest_stage = None;
     let mut kept_bytes = 0.0;
     for stage in stages.iter().filter(|stage| stage.runs) {
-        if kept_bytes + stage.memory_bytes > forecast.memory_bytes {
-            forecast = Forecast {
-                memory_bytes: kept_bytes + stage.memory_bytes,
-                largest: Some(stage.stage),
-            };
+        if kept_bytes + stage.memory_bytes > largest_bytes {
+            largest_bytes = kept_bytes + stage.memory_bytes;
+            largest_stage = Some(stage.stage);
         }
         kept_bytes += stage.kept_bytes;
     }
-    forecast
+    (largest_bytes, largest_stage)
 }
 
 #[cfg(test)]
@@ -105,20 +93,11 @@ mod tests {
             planned(Stage::Signals, Some([40.0, 30.0])),
             planned(Stage::Files, Some([35.0, 0.0])),
         ];
-        let of = |count: usize| total(&stages[..count]);
-        assert_eq!((of(1).memory_bytes, of(1).largest), (0.0, None));
-        assert_eq!(
-            (of(2).memory_bytes, of(2).largest),
-            (60.0, Some(Stage::CrossPlane))
-        );
+        let largest = |count: usize| largest_memory(&stages[..count]);
+        assert_eq!(largest(1), (0.0, None));
+        assert_eq!(largest(2), (60.0, Some(Stage::CrossPlane)));
         // 10 kept before, 40 at work and 30 of its own; the files then find 40 kept.
-        assert_eq!(
-            (of(3).memory_bytes, of(3).largest),
-            (80.0, Some(Stage::Signals))
-        );
-        assert_eq!(
-            (of(4).memory_bytes, of(4).largest),
-            (80.0, Some(Stage::Signals))
-        );
+        assert_eq!(largest(3), (80.0, Some(Stage::Signals)));
+        assert_eq!(largest(4), (80.0, Some(Stage::Signals)));
     }
 }

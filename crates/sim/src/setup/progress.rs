@@ -57,11 +57,9 @@ pub struct Silent;
 
 impl Observer for Silent {}
 
-struct Stopped;
-
 /// Ends the run from within an [`Observer`]: [`stoppable`], around the run, gives [`Error::Stopped`]. Nothing is printed.
 pub fn stop() -> ! {
-    resume_unwind(Box::new(Stopped))
+    resume_unwind(Box::new(Error::Stopped))
 }
 
 /// Runs work whose observer may [`stop`] it.
@@ -70,9 +68,9 @@ pub fn stop() -> ! {
 /// [`Error::Stopped`] where it was stopped; those of the work.
 pub fn stoppable<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     // What the work was about to change is gone with it: files are put into place as wholes.
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|cause| match cause.is::<Stopped>() {
-        true => Err(Error::Stopped),
-        false => resume_unwind(cause),
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|cause| match cause.downcast::<Error>() {
+        Ok(stopped) => Err(*stopped),
+        Err(cause) => resume_unwind(cause),
     })
 }
 

@@ -317,7 +317,7 @@ fn batches(planned: Vec<(&Case, Plan)>) -> Vec<Vec<(&Case, Plan)>> {
         // Beside what a run takes, the errors of each realisation are kept.
         let of_scan_bytes =
             9.0 * (plan.geometry.elevation_rad.len() * plan.geometry.gate_range_m.len()) as f64;
-        let bytes = plan.total().memory_bytes + plan.realisations() as f64 * of_scan_bytes;
+        let bytes = plan.memory_bytes() + plan.realisations() as f64 * of_scan_bytes;
         match batches.last_mut() {
             Some(batch) if held_bytes + bytes <= room_bytes => {
                 held_bytes += bytes;

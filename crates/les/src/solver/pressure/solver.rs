@@ -20,7 +20,6 @@ use crate::solver::slabs::WHOLE;
 use rayon::prelude::*;
 
 /// How the pressure equation is solved.
-#[non_exhaustive]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum PressureMethod {
     /// The faster one for the mesh.
