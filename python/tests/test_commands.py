@@ -39,6 +39,7 @@ def test_a_dataset_is_retrieved_as_its_file(scan, tmp_path):
     of_file = wakescope.retrieve(tmp_path / "map.nc")
     of_dataset = wakescope.retrieve(scan.map)
     xarray.testing.assert_allclose(of_dataset.drop_vars("file"), of_file.drop_vars("file"), rtol=1e-6)
+    numpy.testing.assert_allclose(of_file.azimuth_rad, numpy.pi / 2)
     assert list(of_file.side.values) == ["left", "right"] and (of_file.gamma_std_m2_s > 0).all()
     covariance = of_file.covariance[0].values
     numpy.testing.assert_allclose(covariance, covariance.T)

@@ -1,6 +1,7 @@
 //! `wakescope detect`: whether scans hold a wake, and how small a wake is found in scans like them.
 
 use super::Cli;
+use super::data_files::each_usable;
 use super::words::{AirWords, FolderWords, ScanWords, finite, rate, spacing, stride};
 use crate::Error;
 use crate::detection::{
@@ -63,8 +64,10 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
         .map(|path| cli.scene(path))
         .transpose()?;
     let (mut scans, mut notes) = (Vec::new(), Vec::new());
-    for path in &words.data {
-        let read = words.scans.read(path, stated.as_ref(), false, &*observer)?;
+    let inputs = each_usable(&words.data, &*observer, |path| {
+        words.scans.read(path, stated.as_ref(), false, &*observer)
+    })?;
+    for read in inputs {
         scans.extend(read.maps);
         notes.extend(read.left_out);
     }

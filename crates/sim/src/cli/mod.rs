@@ -5,6 +5,7 @@
 
 mod accuracy;
 mod bound;
+mod data_files;
 mod detect;
 mod estimate;
 mod flow;

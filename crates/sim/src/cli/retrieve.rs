@@ -1,23 +1,24 @@
 //! `wakescope retrieve`: vortices from scans, maps of any instrument or signals of a scene.
 
 use super::Cli;
+use super::data_files::each_usable;
 use super::words::{
     AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive,
 };
 use crate::io::Provenance;
-use crate::io::scans::ReadScan;
+use crate::io::scans::{ReadScan, are_of_one_plane, face_alike, plane_numbers};
 use crate::outputs::Outputs;
 use crate::plan::Stage;
-use crate::retrieve::{self, Method, RetrievedScan, SceneResponse, Velocities, gate_of};
+use crate::retrieve::{
+    self, Method, PlaneTrack, RetrievedScan, SceneResponse, Velocities, gate_of,
+};
 use crate::scene::{Estimator, SceneFile};
 use crate::setup::progress::{Observer, Silent};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use wakescope_estimate::retrieval::{
-    EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track,
-};
+use wakescope_estimate::retrieval::{EnvelopeResult, Flag, Gate, Movement, RetrievalOptions};
 use wakescope_estimate::vortex_fit::{CoreProfile, Secondary, Wake};
 
 /// Words of `wakescope retrieve`.
@@ -144,7 +145,7 @@ struct Found {
     scans: Vec<RetrievedScan>,
     /// Circulations by envelopes, with the number of their scan.
     envelopes: Vec<(usize, EnvelopeResult)>,
-    track: Option<Track>,
+    tracks: Vec<PlaneTrack>,
 }
 
 pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
@@ -154,58 +155,46 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         .map(|path| cli.scene(path))
         .transpose()?;
     let observer = cli.observer();
-    // The files, and the scene of each scan, where one is known.
-    let (mut inputs, mut scenes) = (Vec::new(), Vec::<Option<SceneFile>>::new());
-    for path in &words.data {
-        if matches!(words.method, Method::Signals | Method::Envelope) && !is_signals(path) {
-            let reason =
-                "it is no file of raw signals, which this method needs: --method fit takes maps"
-                    .into();
-            return Err(Error::Input {
-                path: path.clone(),
-                reason,
-            });
-        }
-        let keeps_spectra = words.method == Method::Envelope;
-        let read = words
-            .scans
-            .read(path, stated.as_ref(), keeps_spectra, &*observer)?;
-        let known = read.signals.as_ref().map(|signals| &signals.plan.scene);
-        // The scans of a file have one scene.
-        let scene = match (known.or(stated.as_ref()), read.maps.first()) {
-            (Some(scene), _) => Some(scene.clone()),
-            (None, Some(scan)) => retrieve::scene_of(scan, &*observer)?,
-            (None, None) => None,
-        };
-        scenes.extend(read.maps.iter().map(|_| scene.clone()));
-        read.left_out
-            .iter()
-            .for_each(|text| observer.warn(&format!("{}: {text}: left out", path.display())));
-        inputs.push(read);
+    let mut inputs = each_usable(&words.data, &*observer, |path| {
+        Input::read(words, path, stated.as_ref(), &*observer)
+    })?;
+    let mut scans: Vec<&mut ReadScan> = Vec::new();
+    for input in &mut inputs {
+        scans.extend(&mut input.scans.maps);
     }
-    let count = scenes.len();
+    face_alike(&mut scans);
+    let planes = plane_numbers(scans.iter().map(|scan| &**scan));
     words
         .folder
-        .prepare(cli, |files| list(words.method, count, None, files))?;
+        .prepare(cli, |files| list(words.method, &planes, None, files))?;
     let mut found = Found::default();
-    observer.begin(Stage::Retrieval, count as u64);
-    for Scans { maps, signals, .. } in inputs {
-        if let Some(signals) = signals {
-            of_signals(words, maps, signals, &mut found, &*observer)?;
+    let scenes: Vec<_> = inputs.iter().map(|input| input.scene.clone()).collect();
+    observer.begin(Stage::Retrieval, planes.len() as u64);
+    let mut refused = None;
+    for Input { scans, scene } in inputs {
+        if let Some(signals) = scans.signals {
+            of_signals(words, scans.maps, signals, &mut found, &*observer)?;
             continue;
         }
-        for scan in maps {
+        for scan in scans.maps {
             let start = prediction(&found.scans, &scan);
-            let scene = scenes[found.scans.len()].as_ref();
-            found
-                .scans
-                .push(of_map(words, scene, scan, start, &*observer)?);
+            match of_map(words, scene.as_ref(), scan, start, &*observer) {
+                Ok(one) => found.scans.push(one),
+                Err(error) if planes.len() > 1 => {
+                    observer.warn(&format!("{error}: left out"));
+                    refused = refused.or(Some(error));
+                }
+                Err(error) => return Err(error),
+            }
             observer.advance(1);
         }
     }
     observer.end();
+    if let (true, Some(error)) = (found.scans.is_empty(), refused) {
+        return Err(error);
+    }
     same_origin(&mut found.scans);
-    found.track = retrieve::track_of(&found.scans)?;
+    found.tracks = retrieve::tracks_of(&found.scans)?;
     let is_of_signals = words.method == Method::Signals
         && found
             .scans
@@ -219,19 +208,62 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     words.folder.finish(
         cli,
         of,
-        |files| list(words.method, count, Some(&found), files),
+        |files| list(words.method, &planes, Some(&found), files),
         (object, text),
     )
 }
 
-/// Where the track of the scans so far says that the wake is, to start from beside the blind search.
+/// A file, and the scene of its scans where one is known.
+struct Input {
+    scans: Scans,
+    scene: Option<SceneFile>,
+}
+
+impl Input {
+    fn read(
+        words: &RetrieveWords,
+        path: &Path,
+        stated: Option<&SceneFile>,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
+        if matches!(words.method, Method::Signals | Method::Envelope) && !is_signals(path) {
+            let reason =
+                "it is no file of raw signals, which this method needs: --method fit takes maps"
+                    .into();
+            return Err(Error::Input {
+                path: path.to_owned(),
+                reason,
+            });
+        }
+        let keeps_spectra = words.method == Method::Envelope;
+        let scans = words.scans.read(path, stated, keeps_spectra, observer)?;
+        let known = scans.signals.as_ref().map(|signals| &signals.plan.scene);
+        let scene = match (known.or(stated), scans.maps.first()) {
+            (Some(scene), _) => Some(scene.clone()),
+            (None, Some(scan)) => retrieve::scene_of(scan, observer)?,
+            (None, None) => None,
+        };
+        scans
+            .left_out
+            .iter()
+            .for_each(|text| observer.warn(&format!("{}: {text}: left out", path.display())));
+        Ok(Self { scans, scene })
+    }
+}
+
+/// Where the track of the scans of its plane says that the wake of a scan is, to start from beside the blind search.
 fn prediction(before: &[RetrievedScan], scan: &ReadScan) -> Option<Wake> {
-    let last = before.last()?;
+    let own = || {
+        before
+            .iter()
+            .filter(|one| are_of_one_plane(&one.scan, scan))
+    };
+    let last = own().next_back()?;
     let reference = scan.reference.zip(last.scan.reference);
     let time_s =
         scan.map.middle_s() + reference.map_or(0.0, |(own, of_last)| own.seconds_since(of_last));
     let core_m = last.result.wake.map_or(2.0, |wake| wake.left.core_radius_m);
-    retrieve::track_of(before)
+    retrieve::track_of(own().map(|one| &one.result))
         .ok()
         .flatten()?
         .prediction(time_s, core_m)
@@ -308,7 +340,8 @@ fn of_signals(
     let own = SceneResponse::of_scene(&plan.scene, &Silent)?;
     let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
     let mut first_line = 0;
-    for (scan, measured) in maps.into_iter().zip(&scans) {
+    for (mut scan, measured) in maps.into_iter().zip(&scans) {
+        scan.azimuth_rad = Some(plan.scene.content.scan.azimuth_rad);
         let (gate, _) = gate_of(Some(&scan), words.air.gate_std, Some(&plan.scene.content))?;
         let mut one = retrieve::retrieve_map(
             scan,
@@ -374,10 +407,10 @@ fn provenance(scenes: &[Option<SceneFile>]) -> Provenance {
     one.map_or_else(|| Provenance::new("", "", 0), SceneFile::provenance)
 }
 
-/// The files of so many scans, whose content is not there before the fits.
+/// The files of scans of these planes, whose content is not there before the fits.
 fn list(
     method: Method,
-    count: usize,
+    planes: &[usize],
     found: Option<&Found>,
     files: &mut Outputs,
 ) -> Result<(), Error> {
@@ -394,24 +427,35 @@ fn list(
             Ok(retrieve::envelope_table(&found.envelopes))
         })?;
     }
-    let tracked = found.and_then(|found| Some((found.track.as_ref()?, &found.scans)));
-    files.table("track", tracked.as_ref(), |(track, _)| {
-        Ok(retrieve::track_table(track))
-    })?;
+    let tracks = found.map(|found| found.tracks.as_slice());
+    files.table(
+        "track",
+        tracks.filter(|tracks| !tracks.is_empty()),
+        |tracks| Ok(retrieve::track_table(tracks)),
+    )?;
     #[cfg(feature = "plots")]
     {
-        for number in 1..=count {
+        for number in 1..=planes.len() {
             let scan = scans.and_then(|scans| scans.get(number - 1));
             files.figure(&format!("scan_{number:03}"), scan, |scan| {
                 retrieve::figure(scan, number)
             })?;
         }
-        files.figure("track", tracked.as_ref(), |(track, scans)| {
-            Ok(retrieve::track_figure(track, scans))
-        })?;
+        let count = planes.iter().max().map_or(1, |last| last + 1);
+        for plane in 0..count {
+            let of_plane = |track: &&PlaneTrack| track.plane == plane;
+            let track = tracks.and_then(|tracks| tracks.iter().find(of_plane));
+            let name = match count {
+                1 => "track".to_owned(),
+                _ => format!("track_{:03}", plane + 1),
+            };
+            files.figure(&name, track.zip(scans).as_ref(), |(track, scans)| {
+                Ok(retrieve::track_figure(track, scans))
+            })?;
+        }
     }
     #[cfg(not(feature = "plots"))]
-    let _ = count;
+    let _ = planes;
     Ok(())
 }
 

@@ -28,7 +28,9 @@ pub use own::{retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]
 pub use pictures::{figure, track_figure};
 pub use realisations::{RetrievalRow, SceneRetrieval};
-pub use table::{RetrievedScan, flags, json, name, rows, track_of, track_table};
+pub use table::{
+    PlaneTrack, RetrievedScan, flags, json, name, rows, track_of, track_table, tracks_of,
+};
 
 pub use crate::measure::response::SceneResponse;
 pub use crate::scene::RetrievalMethod as Method;

@@ -2,13 +2,13 @@
 //!
 //! Check: by eye; the files of a retrieval are named in its test.
 
-use super::table::{RetrievedScan, TRACK};
+use super::table::{PlaneTrack, RetrievedScan, TRACK};
 use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 use ndarray::Array2;
 use wakescope_estimate::retrieval::{
-    Flag, Measured, ScanResult, Side, Track, TrackPoint, expected_velocities,
+    Flag, Measured, ScanResult, Side, TrackPoint, expected_velocities,
 };
 
 /// Velocities, the fitted wake and the residual of a scan side by side; velocities alone where no wake was found.
@@ -93,7 +93,8 @@ fn title(scan: &RetrievedScan, number: usize) -> String {
 }
 
 /// Circulation, lateral position and height against time, with bands of one standard deviation and the results of the scans.
-pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
+pub fn track_figure(of_plane: &PlaneTrack, scans: &[RetrievedScan]) -> Figure {
+    let track = &of_plane.track;
     let panels = [
         ("Circulation", "circulation [m²/s]", 0),
         ("Lateral position", "distance [m]", 1),
@@ -123,7 +124,8 @@ pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
                 Style::Line,
                 of_track.iter().map(|(t, m)| (*t, m.value)),
             );
-            let dots = scans.iter().filter_map(|scan| of_scan(&scan.result));
+            let own = of_plane.scans.iter();
+            let dots = own.filter_map(|number| of_scan(&scans[*number].result));
             plot = plot
                 .with(line.with_band(&stds).in_colour(colour))
                 .with(Series::new("", Style::Markers, dots).in_colour(colour));
@@ -133,9 +135,14 @@ pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
             ..plot
         }
     };
-    let title = "Track of the vortices: smoothed, with one standard deviation";
+    let plane = of_plane
+        .azimuth_rad
+        .map_or_else(String::new, |azimuth_rad| {
+            format!(" at azimuth {:.1}°", azimuth_rad.to_degrees())
+        });
+    let title = format!("Track of the vortices{plane}: smoothed, with one standard deviation");
     Figure {
         width: 1560.0,
-        ..Figure::side_by_side(panels.map(panel)).titled(title)
+        ..Figure::side_by_side(panels.map(panel)).titled(&title)
     }
 }

@@ -4,7 +4,7 @@
 
 use crate::Error;
 use crate::io::Table;
-use crate::io::scans::ReadScan;
+use crate::io::scans::{ReadScan, plane_numbers};
 use serde::Serialize;
 use serde_json::{Value, json};
 use wakescope_estimate::retrieval::{
@@ -57,6 +57,11 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
         .int(
             "sweep",
             of.iter().map(|(_, scan, _)| scan.scan.sweep as i64),
+        )
+        .float(
+            "azimuth_rad",
+            of.iter()
+                .map(|(_, scan, _)| scan.scan.azimuth_rad.unwrap_or(f64::NAN)),
         )
         .float("time_s", of.iter().map(time_s))
         .text(
@@ -125,12 +130,50 @@ pub(super) const VORTEX: [OfVortex; 5] = [
     ("core_m", |v| v.core_radius_m),
 ];
 
-/// The track of several scans in the order of their times; nothing of a single scan, of scans without times, or without a wake.
+/// The track of the vortices in one plane.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlaneTrack {
+    /// Number of the plane, from 0, in the order in which scans of it first come.
+    pub plane: usize,
+    /// Azimuth of the plane, rad, if it is known: that of its first scan.
+    pub azimuth_rad: Option<f64>,
+    /// The numbers of its scans, from 0.
+    pub scans: Vec<usize>,
+    /// Where the vortices are at their times.
+    pub track: Track,
+}
+
+/// The tracks of scans, one for each plane that has one.
 ///
 /// # Errors
 /// What the filter refuses.
-pub fn track_of(scans: &[RetrievedScan]) -> Result<Option<Track>, Error> {
-    let mut results: Vec<&ScanResult> = scans.iter().map(|scan| &scan.result).collect();
+pub fn tracks_of(scans: &[RetrievedScan]) -> Result<Vec<PlaneTrack>, Error> {
+    let numbers = plane_numbers(scans.iter().map(|scan| &scan.scan));
+    let planes = numbers.iter().max().map_or(0, |last| last + 1);
+    let mut tracks = Vec::new();
+    for plane in 0..planes {
+        let own: Vec<usize> = (0..scans.len()).filter(|i| numbers[*i] == plane).collect();
+        let results = own.iter().map(|i| &scans[*i].result);
+        if let Some(track) = track_of(results)? {
+            tracks.push(PlaneTrack {
+                plane,
+                azimuth_rad: scans[own[0]].scan.azimuth_rad,
+                scans: own,
+                track,
+            });
+        }
+    }
+    Ok(tracks)
+}
+
+/// The track of scans of one plane in the order of their times; nothing of a single scan, of scans without times, or without a wake.
+///
+/// # Errors
+/// What the filter refuses.
+pub fn track_of<'r>(
+    results: impl IntoIterator<Item = &'r ScanResult>,
+) -> Result<Option<Track>, Error> {
+    let mut results: Vec<&ScanResult> = results.into_iter().collect();
     results.sort_by(|a, b| a.reference_time_s.total_cmp(&b.reference_time_s));
     let increase = results
         .windows(2)
@@ -154,24 +197,29 @@ pub(super) const TRACK: [OfTrack; 6] = [
     ("decay_per_s", |v| v.decay_per_s),
 ];
 
-/// A row for each vortex and time of a track.
-pub fn track_table(track: &Track) -> Table {
-    let all = track.points.iter().flat_map(|point| {
-        point
-            .vortices
-            .iter()
-            .map(move |vortex| (point.time_s, vortex))
-    });
-    let all: Vec<(f64, &TrackedVortex)> = all.collect();
+/// A row for each vortex and time of each track.
+pub fn track_table(tracks: &[PlaneTrack]) -> Table {
+    let mut all: Vec<(f64, f64, &TrackedVortex)> = Vec::new();
+    for of_plane in tracks {
+        let azimuth_rad = of_plane.azimuth_rad.unwrap_or(f64::NAN);
+        for point in &of_plane.track.points {
+            let own = point.vortices.iter();
+            all.extend(own.map(|vortex| (azimuth_rad, point.time_s, vortex)));
+        }
+    }
     let table = Table::new()
-        .float("time_s", all.iter().map(|(time_s, _)| *time_s))
-        .text("side", all.iter().map(|(_, vortex)| name(vortex.side)))
+        .float(
+            "azimuth_rad",
+            all.iter().map(|(azimuth_rad, ..)| *azimuth_rad),
+        )
+        .float("time_s", all.iter().map(|(_, time_s, _)| *time_s))
+        .text("side", all.iter().map(|(.., vortex)| name(vortex.side)))
         .int(
             "detected",
-            all.iter().map(|(_, vortex)| i64::from(vortex.detected)),
+            all.iter().map(|(.., vortex)| i64::from(vortex.detected)),
         );
     TRACK.iter().fold(table, |table, (name, get)| {
-        measured(table, name, all.iter().map(|(_, vortex)| get(vortex)))
+        measured(table, name, all.iter().map(|(.., vortex)| get(vortex)))
     })
 }
 
@@ -215,7 +263,8 @@ pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
         let r = &scan.result;
         let rows: Vec<Vec<f64>> = r.covariance.outer_iter().map(|row| row.to_vec()).collect();
         json!({
-            "scan": number + 1, "file": scan.scan.path.to_string_lossy(), "sweep": scan.scan.sweep, "reference_time_s": r.reference_time_s,
+            "scan": number + 1, "file": scan.scan.path.to_string_lossy(), "sweep": scan.scan.sweep, "azimuth_rad": scan.scan.azimuth_rad,
+            "reference_time_s": r.reference_time_s,
             "vortices": r.vortices.iter().map(of_vortex).collect::<Vec<_>>(),
             "wind_m_s": r.lateral_wind_m_s, "shear_per_s": r.wind_shear_per_s,
             "chi2_per_dof": r.chi2_per_dof, "cells_used": r.cells_used, "cells_rejected": r.cells_rejected,

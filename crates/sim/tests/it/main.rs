@@ -19,6 +19,8 @@ mod host;
 mod hostile_files;
 #[cfg(feature = "cli")]
 mod messages;
+#[cfg(all(feature = "cli", feature = "plots"))]
+mod planes;
 mod receiver;
 #[cfg(all(feature = "cli", feature = "plots"))]
 mod retrieve;

@@ -647,7 +647,7 @@ fn several_scans_are_tracked() {
     let table = retrieved(temp.path(), "scans.csv --gate-std 0 --motion no");
     assert_eq!(table.rows.len(), 8);
     let track = TextTable::read(&temp.path().join("r/track.csv")).unwrap();
-    assert_eq!((track.rows.len(), track.rows[0].len()), (8, 15));
+    assert_eq!((track.rows.len(), track.rows[0].len()), (8, 16));
     for row in 0..8 {
         let (rate, std) = (
             number(&track, row, "z_rate_m_s"),
@@ -710,7 +710,7 @@ fn what_is_no_map_is_refused_and_nothing_is_written() {
                 "{},{},1,{}\n",
                 300 + 10 * (i % 10),
                 0.1 + 0.01 * (i / 10) as f64,
-                i / 50
+                i / 10
             )
         })
         .collect();

@@ -4,8 +4,8 @@
 //! standard names, which say the sign, or by the names that instruments use. Check: maps of this program, and of Py-ART and
 //! xradar in the tests of the program; files without Nyquist velocity, with ragged gates, another sign, several sweeps.
 
-use super::grid::{RayRow, between_turns, mean_count, of_mean, one_plane, scan_map};
-use super::{Found, ReadScan, ScanFormat};
+use super::grid::{RayRow, mean_count, of_mean, scan_map};
+use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::netcdf_input::NetcdfFile;
 use crate::io::units::Quantity;
 use crate::io::{UtcTime, cfradial::MIRRORED};
@@ -50,6 +50,7 @@ pub(super) fn scans(
         first(file, NYQUIST)?.map(|nyquist| 2.0 * nyquist)
     };
     let pulse_width_s = first(file, "pulse_width")?;
+    let place_deg = place(file)?;
     let of_field = |name| file.text(&velocity.name, name);
     let scene_toml = file
         .global_text("scene")
@@ -67,23 +68,20 @@ pub(super) fn scans(
             .filter(is_still)
             .map(|ray| rays[ray].clone())
             .collect();
-        if let Err(reason) = one_plane(&rows, &what) {
-            left_out.push(reason);
-            continue;
-        }
-        let heights: Vec<f64> = rows.iter().map(|row| row.elevation_rad).collect();
-        for part in between_turns(&heights) {
-            let rows = rows[part].to_vec();
-            if rows
-                .iter()
-                .all(|row| (row.elevation_rad - rows[0].elevation_rad).abs() < 1e-4)
-            {
-                left_out.push(format!("{what}: all of its rays have one elevation"));
+        let (found, skipped) = match planes::in_order(rows) {
+            Ok(split) => split,
+            Err(reason) => {
+                left_out.push(format!("{what}: {reason}"));
                 continue;
             }
-            match scan_map(rows, range_m.clone(), fold_m_s, &what) {
+        };
+        left_out.extend(skipped.iter().map(|text| format!("{what}: {text}")));
+        for scan in found {
+            match scan_map(scan.rays, range_m.clone(), fold_m_s, &what) {
                 Err(reason) => left_out.push(reason),
                 Ok(map) => out.push(ReadScan {
+                    azimuth_rad: scan.azimuth_rad,
+                    place_deg,
                     reference,
                     gate_length_m: range_m.get(1).map(|second_m| second_m - range_m[0]),
                     pulse_width_s,
@@ -291,17 +289,16 @@ impl GateLayout {
     }
 }
 
-/// An angle of each ray, rad.
+/// An angle of each ray, rad; NaN where it is missing.
 fn angles(file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
     let units = file
         .text(name, "units")
         .unwrap_or_default()
         .to_ascii_lowercase();
     let values = file.floats(name)?;
-    match values.iter().position(|value| !value.is_finite()) {
-        Some(ray) => Err(format!("{name} of ray {ray} is missing")),
-        None if units.starts_with("rad") => Ok(values),
-        None => Ok(values.into_iter().map(f64::to_radians).collect()),
+    match units.starts_with("rad") {
+        true => Ok(values),
+        false => Ok(values.into_iter().map(f64::to_radians).collect()),
     }
 }
 
@@ -375,6 +372,17 @@ fn optional(file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
         file.floats(name)
     } else {
         Ok(Vec::new())
+    }
+}
+
+/// Latitude and longitude of an instrument that stands, degrees; nothing where they are missing or change from ray to ray.
+fn place(file: &NetcdfFile) -> Result<Option<[f64; 2]>, String> {
+    let [latitude, longitude] = ["latitude", "longitude"].map(|name| optional(file, name));
+    match (&latitude?[..], &longitude?[..]) {
+        ([latitude], [longitude]) if (latitude + longitude).is_finite() => {
+            Ok(Some([*latitude, *longitude]))
+        }
+        _ => Ok(None),
     }
 }
 
@@ -526,6 +534,18 @@ mod tests {
     }
 
     #[test]
+    fn rays_without_an_elevation_are_skipped_and_counted() {
+        let mut made = made();
+        made.0.get_mut("elevation").unwrap().2[3] = f64::NAN;
+        let (found, left_out) = read(&made).unwrap();
+        assert_eq!(found[0].map.elevation_rad.len(), 5);
+        assert!(
+            left_out[0].contains("sweep 0: 1 of 6 rays have no elevation"),
+            "{left_out:?}"
+        );
+    }
+
+    #[test]
     fn sign_folds_masks_and_ragged_gates_follow_the_file() {
         let mut towards = made();
         let (shape, _, values) = towards.0.remove("VEL").unwrap();
@@ -651,10 +671,6 @@ mod tests {
         assert!(
             refused(&|m| m.0.get_mut("sweep_end_ray_index").unwrap().2 = vec![5.0, 99.0])
                 .contains("ray 99")
-        );
-        assert!(
-            refused(&|m| m.0.get_mut("elevation").unwrap().2[3] = f64::NAN)
-                .contains("elevation of ray 3 is missing")
         );
         let all_missing = |m: &mut Made| m.0.get_mut("VEL").unwrap().2.fill(f64::NAN);
         let (found, left_out) = {

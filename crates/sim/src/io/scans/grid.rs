@@ -1,9 +1,9 @@
 //! Lines of sight with their velocities as the grid of a map: sorted by elevation, equal ones averaged, checked.
 //!
-//! Check: scans up and down, lines of one elevation, angles of several azimuths.
+//! Check: lines of one elevation; what makes no map.
 
+use super::planes::FEWEST_LINES;
 use ndarray::Array2;
-use std::ops::Range;
 use wakescope_estimate::retrieval::ScanMap;
 
 /// A line of sight as a file has it.
@@ -19,17 +19,11 @@ pub(super) struct RayRow {
     pub(super) sigma_m_s: Vec<f64>,
 }
 
-/// Largest difference of the azimuths of one scan, rad.
-const ONE_PLANE_RAD: f64 = 0.02;
-/// Part of a scan's elevations that a line must go back for another scan to begin.
-const TURN: f64 = 0.1;
-/// Elevations of a scan, with rounding, rad: beyond the zenith it looks to the other side.
-const ALLOWED_RAD: std::ops::RangeInclusive<f64> =
-    -std::f64::consts::FRAC_PI_2 - 1e-6..=std::f64::consts::PI + 1e-6;
 /// Farthest range of a gate, m: that of a scene.
 const FARTHEST_M: f64 = 1e6;
-/// Least lines, gates and velocities of a map.
-const LEAST: (usize, usize, usize) = (3, 3, 30);
+/// Fewest gates and velocities of a map.
+const FEWEST_GATES: usize = 3;
+const FEWEST_VELOCITIES: usize = 30;
 
 /// Scans of which the scatter tells a deviation.
 const ENOUGH_SCANS: f64 = 20.0;
@@ -58,15 +52,6 @@ pub(super) fn scan_map(
     fold_m_s: Option<f64>,
     what: &str,
 ) -> Result<ScanMap, String> {
-    if let Some(bad) = rays
-        .iter()
-        .find(|ray| !ALLOWED_RAD.contains(&ray.elevation_rad))
-    {
-        return Err(format!(
-            "{what}: elevation is {} degrees: from -90 to 180 are allowed, beyond 90 to the other side",
-            bad.elevation_rad.to_degrees()
-        ));
-    }
     let gates = range_m.len();
     if let Some(pair) = range_m
         .windows(2)
@@ -94,11 +79,10 @@ pub(super) fn scan_map(
     let lines: Vec<&[RayRow]> = rays
         .chunk_by(|a, b| a.elevation_rad == b.elevation_rad)
         .collect();
-    let (least_lines, least_gates, least_values) = LEAST;
-    if lines.len() < least_lines || gates < least_gates {
+    if lines.len() < FEWEST_LINES || gates < FEWEST_GATES {
         return Err(format!(
-            "{what}: it has {} different elevations and {gates} ranges; a scan in elevation (RHI) of at least {least_lines} lines and \
-             {least_gates} gates is needed",
+            "{what}: it has {} different elevations and {gates} ranges; a scan in elevation (RHI) of at least {FEWEST_LINES} lines and \
+             {FEWEST_GATES} gates is needed",
             lines.len()
         ));
     }
@@ -137,11 +121,11 @@ pub(super) fn scan_map(
         .iter()
         .filter(|value| value.is_finite())
         .count();
-    if values < least_values {
+    if values < FEWEST_VELOCITIES {
         return Err(match values {
             0 => format!("{what}: all of its velocities are missing"),
             _ => format!(
-                "{what}: it has {values} velocities that are not missing; at least {least_values} are needed"
+                "{what}: it has {values} velocities that are not missing; at least {FEWEST_VELOCITIES} are needed"
             ),
         });
     }
@@ -167,67 +151,6 @@ pub(super) fn scan_map(
         sigma_m_s,
         fold_m_s: fold_m_s.filter(|fold| *fold > 0.0 && fold.is_finite()),
     })
-}
-
-/// Refuses rays that do not lie in one vertical plane on one side of the lidar; `what` names the scan in messages.
-pub(super) fn one_plane(rays: &[RayRow], what: &str) -> Result<(), String> {
-    let Some(first) = rays
-        .iter()
-        .map(|ray| ray.azimuth_rad)
-        .find(|azimuth| azimuth.is_finite())
-    else {
-        return Ok(());
-    };
-    let apart = |azimuth: f64| {
-        (azimuth - first + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
-            - std::f64::consts::PI
-    };
-    // Near the zenith an azimuth says nothing.
-    let known = rays
-        .iter()
-        .filter(|ray| ray.azimuth_rad.is_finite() && ray.elevation_rad.cos() > 0.05);
-    let (low, high) = known
-        .map(|ray| apart(ray.azimuth_rad))
-        .fold((0.0_f64, 0.0_f64), |(low, high), a| {
-            (low.min(a), high.max(a))
-        });
-    if high - low <= ONE_PLANE_RAD {
-        return Ok(());
-    }
-    let [low, high] = [first + low, first + high].map(f64::to_degrees);
-    Err(format!(
-        "{what}: it has azimuths from {low:.2} to {high:.2} degrees; a scan in elevation (RHI) has one"
-    ))
-}
-
-/// Scans that follow each other: a line that goes back by more than a tenth of all elevations begins another.
-pub(super) fn between_turns(elevation_rad: &[f64]) -> Vec<Range<usize>> {
-    let ends = elevation_rad
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| {
-            (low.min(*e), high.max(*e))
-        });
-    let back = TURN * (ends.1 - ends.0);
-    let mut out = Vec::new();
-    let (mut first, mut extreme, mut direction) = (0, 0, 0.0);
-    for i in 1..elevation_rad.len() {
-        let step = elevation_rad[i] - elevation_rad[extreme];
-        if direction == 0.0 {
-            if step.abs() > back {
-                direction = step.signum();
-                extreme = i;
-            }
-        } else if step * direction >= 0.0 {
-            extreme = i;
-        } else if step.abs() > back {
-            out.push(first..extreme + 1);
-            (first, direction) = (extreme + 1, 0.0);
-            // What goes on the same way after a jump back is a scan, too.
-            extreme = first;
-        }
-    }
-    out.push(first..elevation_rad.len());
-    out
 }
 
 #[cfg(test)]
@@ -262,21 +185,6 @@ mod tests {
     }
 
     #[test]
-    fn scans_end_where_the_elevation_turns() {
-        let up = |n: usize| (0..n).map(|i| 0.01 * i as f64);
-        let both: Vec<f64> = up(20).chain(up(20).rev().skip(1)).collect();
-        assert_eq!(between_turns(&both), [0..20, 20..39]);
-        let again: Vec<f64> = up(20).chain(up(20)).chain(up(20)).collect();
-        assert_eq!(between_turns(&again), [0..20, 20..40, 40..60]);
-        let mut shaky: Vec<f64> = up(20).collect();
-        shaky[7] -= 0.011;
-        assert_eq!(
-            between_turns(&shaky),
-            vec![std::ops::Range { start: 0, end: 20 }]
-        );
-    }
-
-    #[test]
     fn what_is_no_scan_is_refused_by_name() {
         let refused = |rays: Vec<RayRow>, range_m: Vec<f64>| {
             scan_map(rays, range_m, None, "sweep 3").unwrap_err()
@@ -284,7 +192,6 @@ mod tests {
         assert!(
             refused(rays([0.1; 9]), range_m()).contains("sweep 3: it has 1 different elevations")
         );
-        assert!(refused(rays([0.1, 0.2, 3.2]), range_m()).contains("elevation"));
         let mut falling = range_m();
         falling.swap(3, 4);
         assert!(refused(rays([0.1, 0.2, 0.3]), falling).contains("range must increase"));
@@ -302,11 +209,5 @@ mod tests {
             .iter_mut()
             .for_each(|ray| ray.velocity_m_s = vec![-9999.0; 12]);
         assert!(refused(missing, range_m()).contains("fill value"));
-        let mut planes = rays([0.1, 0.2, 0.3]);
-        assert_eq!(one_plane(&planes, "scan 1"), Ok(()));
-        planes[1].azimuth_rad = 1.0 + std::f64::consts::TAU;
-        assert_eq!(one_plane(&planes, "scan 1"), Ok(()));
-        planes[1].azimuth_rad = 1.5;
-        assert!(one_plane(&planes, "scan 1").is_err());
     }
 }

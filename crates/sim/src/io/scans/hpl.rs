@@ -4,8 +4,8 @@
 //! the scan type decides. Noise has velocities over the whole band; what tells it is the intensity.
 //! Check: a map written by this program comes back; each dialect; files that are cut short.
 
-use super::grid::{RayRow, between_turns, one_plane, scan_map};
-use super::{ReadScan, ScanFormat};
+use super::grid::{RayRow, scan_map};
+use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::UtcTime;
 use std::path::Path;
 
@@ -24,8 +24,8 @@ struct Header {
     start: Option<UtcTime>,
 }
 
-/// The scans of a text.
-pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<ReadScan>, String> {
+/// The scans of a text, and what was left out.
+pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Found, String> {
     let mut lines = text.lines().enumerate();
     let mut head = Vec::new();
     for (_, line) in lines.by_ref() {
@@ -90,20 +90,22 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
         ));
     }
     mask_noise(&mut rays, &intensities, format);
-    let elevation_rad: Vec<f64> = rays.iter().map(|ray| ray.elevation_rad).collect();
+    let (found, mut left_out) = planes::in_order(rays)?;
     let mut out = Vec::new();
-    for (sweep, part) in between_turns(&elevation_rad).into_iter().enumerate() {
-        let rays = rays[part].to_vec();
+    for (sweep, scan) in found.into_iter().enumerate() {
         let what = format!("scan {}", sweep + 1);
-        one_plane(&rays, &what)?;
-        out.push(ReadScan {
-            reference: header.start,
-            gate_length_m: Some(header.gate_length_m),
-            is_own: head.contains(&crate::io::hpl::SYSTEM_ID),
-            ..ReadScan::new(path, sweep, scan_map(rays, range_m.clone(), None, &what)?)
-        });
+        match scan_map(scan.rays, range_m.clone(), None, &what) {
+            Err(reason) => left_out.push(reason),
+            Ok(map) => out.push(ReadScan {
+                azimuth_rad: scan.azimuth_rad,
+                reference: header.start,
+                gate_length_m: Some(header.gate_length_m),
+                is_own: head.contains(&crate::io::hpl::SYSTEM_ID),
+                ..ReadScan::new(path, sweep, map)
+            }),
+        }
     }
-    Ok(out)
+    Ok((out, left_out))
 }
 
 impl Header {
@@ -233,7 +235,7 @@ mod tests {
     }
 
     fn read(text: &str, format: &ScanFormat) -> ReadScan {
-        let mut found = scans(text, Path::new("x.hpl"), format).unwrap();
+        let (mut found, _) = scans(text, Path::new("x.hpl"), format).unwrap();
         assert_eq!(found.len(), 1);
         found.remove(0)
     }
@@ -264,7 +266,10 @@ mod tests {
             ..ScanFormat::default()
         };
         assert!(
-            scans(&file(&[]), Path::new("x.hpl"), &loud).is_err(),
+            scans(&file(&[]), Path::new("x.hpl"), &loud)
+                .unwrap()
+                .0
+                .is_empty(),
             "0.2 is -7 dB"
         );
         let towards = ScanFormat {

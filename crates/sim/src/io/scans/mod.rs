@@ -6,12 +6,15 @@
 //! | HALO `.hpl` | the line `****` | positive away; below an intensity threshold there is noise |
 //! | table | the header names `range_m`, an elevation and a velocity | positive away; empty cells |
 //!
-//! Check: what the writers write comes back; files of other hands; damaged ones are refused with their field.
+//! `planes` finds the scans among the rays. Check: what the writers write comes back; files of other hands; damaged ones are refused with their field.
 
 mod cfradial;
 mod grid;
 mod hpl;
+mod planes;
 mod table;
+
+pub use planes::{are_of_one_plane, face_alike, plane_numbers};
 
 use crate::Error;
 use crate::io::{UtcTime, text_file};
@@ -50,6 +53,10 @@ pub struct ReadScan {
     pub path: PathBuf,
     /// Number of the sweep in the file, from 0.
     pub sweep: usize,
+    /// Azimuth of the vertical plane of the scan, rad, from 0 to 2 pi, for elevations below 90 degrees; none if it is unknown.
+    pub azimuth_rad: Option<f64>,
+    /// Latitude and longitude of an instrument that stands, degrees, if the file has them.
+    pub place_deg: Option<[f64; 2]>,
     /// The velocities; times count from `reference`.
     pub map: ScanMap,
     /// Date from which times count, if the file has one.
@@ -89,6 +96,8 @@ impl ReadScan {
         Self {
             path: path.to_owned(),
             sweep,
+            azimuth_rad: None,
+            place_deg: None,
             map,
             reference: None,
             gate_length_m: None,
@@ -113,23 +122,17 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
         reason,
     };
     let (_, length, magic) = text_file::begin(path)?;
-    match &magic[..] {
+    let (scans, left_out) = match &magic[..] {
         [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
-            let (mut out, mut left_out) = (Vec::new(), Vec::new());
+            let mut all = Found::default();
             let groups = crate::io::netcdf_input::open_groups(path, "elevation")?;
             for (sweep, group) in groups.into_iter().enumerate() {
                 let found = cfradial::scans(&group, path, format, sweep);
-                let (scans, others) = found.map_err(|reason| group.refuse(reason))?;
-                out.extend(scans);
-                left_out.extend(others);
+                let (scans, left_out) = found.map_err(|reason| group.refuse(reason))?;
+                all.0.extend(scans);
+                all.1.extend(left_out);
             }
-            if out.is_empty() {
-                let left_out = left_out.join("; ");
-                return Err(refuse(format!(
-                    "it has no scan in elevation (RHI) that can be used: {left_out}"
-                )));
-            }
-            Ok((out, left_out))
+            all
         }
         _ => {
             if length > LARGEST_TEXT_BYTES {
@@ -155,9 +158,19 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
                 true => hpl::scans(&text, path, format),
                 false => table::scans(&text, path, format),
             };
-            found.map(|scans| (scans, Vec::new())).map_err(refuse)
+            found.map_err(refuse)?
         }
+    };
+    if scans.is_empty() {
+        return Err(refuse(match &left_out[..] {
+            [only] => only.clone(),
+            _ => format!(
+                "it has no scan in elevation (RHI) that can be used: {}",
+                left_out.join("; ")
+            ),
+        }));
     }
+    Ok((scans, left_out))
 }
 
 /// Largest text that is read \[bytes\].

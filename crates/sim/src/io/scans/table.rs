@@ -2,8 +2,8 @@
 //!
 //! Check: maps of a run, references, cells that are missing, twice there, or make no grid.
 
-use super::grid::{RayRow, mean_count, of_mean, one_plane, scan_map};
-use super::{ReadScan, ScanFormat};
+use super::grid::{RayRow, mean_count, of_mean, scan_map};
+use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::csv_input::TextTable;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -38,39 +38,51 @@ struct Row {
     count: f64,
 }
 
-/// The scans of a table.
-pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<ReadScan>, String> {
+/// The scans of a table, and what was left out.
+pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Found, String> {
     let table = TextTable::parse(text)?;
     // Programs that write it again keep the names of its columns.
     let is_own =
         table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some();
-    let rows = rows(&table, format, is_own)?;
+    let (rows, skipped) = rows(&table, format, is_own)?;
     if rows.is_empty() {
-        return Err("it has a header and no rows".into());
+        return Err("it has a header and no rows with an elevation".into());
     }
     let scene_toml = Some(table.origin().scene_toml).filter(|text| !text.is_empty());
-    rows.into_iter()
-        .map(|(sweep, rows)| {
-            let (rays, range_m) = grid(&rows)?;
-            let what = format!("sweep {sweep}");
-            one_plane(&rays, &what)?;
-            Ok(ReadScan {
-                scene_toml: scene_toml.clone(),
-                scans: mean_count(rows.iter().map(|row| row.count)),
-                is_own,
-                ..ReadScan::new(path, sweep as usize, scan_map(rays, range_m, None, &what)?)
-            })
-        })
-        .collect()
+    let (mut out, mut left_out) = (Vec::new(), Vec::new());
+    if skipped > 0 {
+        let all = table.rows.len();
+        left_out.push(format!("{skipped} of {all} rows have no elevation"));
+    }
+    for (sweep, rows) in rows {
+        let (rays, range_m) = grid(&rows)?;
+        let what = format!("sweep {sweep}");
+        let (found, skipped) =
+            planes::in_any_order(rays).map_err(|reason| format!("{what}: {reason}"))?;
+        left_out.extend(skipped.iter().map(|text| format!("{what}: {text}")));
+        for scan in found {
+            match scan_map(scan.rays, range_m.clone(), None, &what) {
+                Err(reason) => left_out.push(reason),
+                Ok(map) => out.push(ReadScan {
+                    azimuth_rad: scan.azimuth_rad,
+                    scene_toml: scene_toml.clone(),
+                    scans: mean_count(rows.iter().map(|row| row.count)),
+                    is_own,
+                    ..ReadScan::new(path, sweep as usize, map)
+                }),
+            }
+        }
+    }
+    Ok((out, left_out))
 }
 
-/// The rows of each sweep. Numbers of this program's maps have the digits of their NetCDF files, single precision and angles in degrees:
+/// The rows of each sweep, and the number of rows without an elevation. Numbers of this program's maps have the digits of their NetCDF files, single precision and angles in degrees:
 /// fits to what jumps tell the same of both.
 fn rows(
     table: &TextTable,
     format: &ScanFormat,
     is_own: bool,
-) -> Result<BTreeMap<u64, Vec<Row>>, String> {
+) -> Result<(BTreeMap<u64, Vec<Row>>, usize), String> {
     let one_of = |names: &[&str]| names.iter().find_map(|name| table.column(name));
     let needed = |names: &[&str]| {
         one_of(names).ok_or_else(|| {
@@ -101,6 +113,7 @@ fn rows(
     let is_mean = table.header[velocity] == OWN;
     let (sigma, count) = (one_of(&SIGMAS), table.column("count").filter(|_| is_mean));
     let mut out: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
+    let mut skipped = 0;
     for (row, cells) in table.rows.iter().enumerate() {
         let refuse = |reason: &str| Err(format!("row {}: {reason}", row + 1));
         let number = |column: usize| table.number(row, column);
@@ -116,12 +129,16 @@ fn rows(
         if !(sweep >= 0.0 && sweep.fract() == 0.0) {
             return refuse("sweep is no whole number");
         }
+        if is_missing(&cells[elevation.0]) {
+            skipped += 1;
+            continue;
+        }
         let (range_m, elevation_rad) = (single(range), radians(elevation));
         if !(range_m.is_finite() && elevation_rad.is_finite()) {
             return refuse("its range or elevation is no number");
         }
-        let (text, velocity_m_s) = (cells[velocity].trim(), single(velocity));
-        if velocity_m_s.is_nan() && !(text.is_empty() || text.eq_ignore_ascii_case("nan")) {
+        let velocity_m_s = single(velocity);
+        if velocity_m_s.is_nan() && !is_missing(&cells[velocity]) {
             return refuse("its velocity is no number; an empty cell is a missing one");
         }
         let is_noise = snr.is_some_and(|c| format.is_noise(number(c)))
@@ -144,23 +161,42 @@ fn rows(
             count: count.map_or(f64::NAN, number),
         });
     }
-    Ok(out)
+    Ok((out, skipped))
 }
 
-/// The rays of one scan on the ranges of all.
+/// Whether a cell says that there is no number.
+fn is_missing(cell: &str) -> bool {
+    let text = cell.trim();
+    text.is_empty() || text.eq_ignore_ascii_case("nan")
+}
+
+/// The rays of one sweep on the ranges of all, in the order in which they first come.
 fn grid(rows: &[Row]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
     let range_m = axis(rows.iter().map(|row| row.range_m));
     let elevation_rad = axis(rows.iter().map(|row| row.elevation_rad));
-    let (lines, gates) = (elevation_rad.len(), range_m.len());
+    let gates = range_m.len();
+    let mut lines: BTreeMap<(usize, u64), usize> = BTreeMap::new();
+    let line_of: Vec<usize> = rows
+        .iter()
+        .map(|row| {
+            let direction = (
+                nearest(&elevation_rad, row.elevation_rad),
+                row.azimuth_rad.to_bits(),
+            );
+            let next = lines.len();
+            *lines.entry(direction).or_insert(next)
+        })
+        .collect();
+    let lines = lines.len();
     if gates * lines > 10 * rows.len() + 1000 {
         return Err(format!(
-            "its {} rows make no polar grid: they have {gates} different ranges and {lines} different elevations",
+            "its {} rows make no polar grid: they have {gates} different ranges and {lines} different directions",
             rows.len()
         ));
     }
     let has_sigma = rows.iter().any(|row| row.sigma_m_s.is_some());
-    let empty = |elevation_rad: &f64| RayRow {
-        elevation_rad: *elevation_rad,
+    let empty = RayRow {
+        elevation_rad: f64::NAN,
         azimuth_rad: f64::NAN,
         time_s: f64::NAN,
         velocity_m_s: vec![f64::NAN; gates],
@@ -170,13 +206,10 @@ fn grid(rows: &[Row]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
             Vec::new()
         },
     };
-    let mut rays: Vec<RayRow> = elevation_rad.iter().map(empty).collect();
+    let mut rays = vec![empty; lines];
     let mut seen = vec![false; gates * lines];
-    for row in rows {
-        let (line, gate) = (
-            nearest(&elevation_rad, row.elevation_rad),
-            nearest(&range_m, row.range_m),
-        );
+    for (row, line) in rows.iter().zip(line_of) {
+        let gate = nearest(&range_m, row.range_m);
         if std::mem::replace(&mut seen[line * gates + gate], true) {
             return Err(format!(
                 "row {}: range {} m at elevation {} rad is there twice: a column sweep tells scans apart",
@@ -184,17 +217,14 @@ fn grid(rows: &[Row]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
             ));
         }
         let ray = &mut rays[line];
+        ray.elevation_rad = elevation_rad[nearest(&elevation_rad, row.elevation_rad)];
+        ray.azimuth_rad = row.azimuth_rad;
         ray.velocity_m_s[gate] = row.velocity_m_s;
         if let Some(sigma_m_s) = row.sigma_m_s {
             ray.sigma_m_s[gate] = sigma_m_s;
         }
-        for (of, value) in [
-            (&mut ray.time_s, row.time_s),
-            (&mut ray.azimuth_rad, row.azimuth_rad),
-        ] {
-            if value.is_finite() {
-                *of = value;
-            }
+        if row.time_s.is_finite() {
+            ray.time_s = row.time_s;
         }
     }
     Ok((rays, range_m))

@@ -1,0 +1,707 @@
+//! Scans in elevation among the rays of a file: which rays lie in one vertical plane, and which are on the way between two.
+//!
+//! A plane is named by an azimuth. Beyond the zenith the elevation rises to 180 degrees, or the azimuth turns to the opposite one while
+//! the elevation falls again: both describe the same lines of sight, and scans have the first. Rays that follow each other in one plane
+//! are a scan until the elevation turns or jumps back. Rays outside the planes of the scans (a scanner that turns to the next plane, cuts
+//! at one elevation) and rays of impossible or isolated elevation are skipped and counted.
+//! Check: scans up and down, over the zenith, of several planes in turn, with transition rays, about azimuth 0.
+
+use super::ReadScan;
+use super::grid::RayRow;
+use ndarray::{Array2, s};
+use std::collections::BTreeSet;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
+use std::ops::Range;
+use wakescope_estimate::retrieval::ScanMap;
+
+/// Largest angle between a ray and the plane of its scan, rad, and between two rays of a scan.
+const OFF_PLANE_RAD: f64 = 0.02;
+const SPREAD_RAD: f64 = 0.03;
+/// Scans of one plane agree in azimuth to this angle, rad: scanners repeat a direction to a tenth of a degree, and planes that are
+/// scanned on purpose are a degree apart.
+const SAME_PLANE_RAD: f64 = 0.01;
+/// Latitudes and longitudes of one place agree to this, degrees: some ten metres, to which receivers of satellites repeat.
+const SAME_PLACE_DEG: f64 = 2e-4;
+/// A scan extends farther in elevation than across its plane, by this factor: where azimuth and elevation turn together there is no plane.
+const FLATNESS: f64 = 3.0;
+/// The azimuth says nothing where the cosine of the elevation is smaller.
+const NEAR_ZENITH: f64 = 0.05;
+/// Fraction of a scan's elevations that a line must go back for another scan to begin.
+const TURN: f64 = 0.1;
+/// Elevations of a scan, with rounding, rad: beyond the zenith it looks to the other side.
+const ALLOWED_RAD: std::ops::RangeInclusive<f64> = -FRAC_PI_2 - 1e-6..=PI + 1e-6;
+/// Fraction of the rays whose elevations may be impossible; more say that the unit is another one.
+const IMPOSSIBLE: f64 = 0.1;
+/// An elevation is isolated if it is this many usual steps away from those before and after it, which are a few steps apart.
+const ISOLATED_STEPS: f64 = 10.0;
+const NEIGHBOUR_STEPS: f64 = 4.0;
+/// Fewest rays among which an elevation can be isolated.
+const FEWEST_RAYS: usize = 8;
+/// Fewest different elevations of a scan, and the least extent of those of one that is no stare, rad.
+pub(super) const FEWEST_LINES: usize = 3;
+const LEVEL_RAD: f64 = 1e-3;
+/// Most rays outside the plane within one scan.
+const MOST_BETWEEN: usize = 5;
+
+/// The rays of one scan, with elevations from -90 to 180 degrees.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PlaneScan {
+    /// From 0 to 2 pi; none if it is unknown.
+    pub(super) azimuth_rad: Option<f64>,
+    pub(super) rays: Vec<RayRow>,
+}
+
+/// Scans, and what was skipped.
+pub(super) type Split = (Vec<PlaneScan>, Vec<String>);
+
+/// A vertical plane through the lidar, by the azimuth of its front; NaN if it is unknown.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    azimuth_rad: f64,
+}
+
+impl Plane {
+    /// The plane of the first ray whose azimuth says something.
+    fn first_of<'r>(rays: impl IntoIterator<Item = &'r RayRow>) -> Self {
+        let azimuth_rad = rays.into_iter().find(|ray| is_directed(ray));
+        Self {
+            azimuth_rad: azimuth_rad.map_or(f64::NAN, |ray| ray.azimuth_rad),
+        }
+    }
+
+    /// Azimuth of a ray relative to the front; 0 if either is unknown.
+    fn turn_rad(self, ray: &RayRow) -> f64 {
+        let turn_rad = difference_rad(ray.azimuth_rad, self.azimuth_rad);
+        if turn_rad.is_nan() { 0.0 } else { turn_rad }
+    }
+
+    /// Component of a ray across the plane, the sine of the angle between them.
+    fn across(self, ray: &RayRow) -> f64 {
+        self.turn_rad(ray).sin() * ray.elevation_rad.cos()
+    }
+
+    /// Whether the azimuth of a ray is that of the back, so that its elevation counts beyond the zenith.
+    fn is_behind(self, ray: &RayRow) -> bool {
+        self.turn_rad(ray).abs() > FRAC_PI_2
+    }
+
+    /// Elevation of a ray from the horizon in front, rad.
+    fn elevation_rad(self, ray: &RayRow) -> f64 {
+        if self.is_behind(ray) {
+            PI - ray.elevation_rad
+        } else {
+            ray.elevation_rad
+        }
+    }
+
+    /// Azimuth of a ray or, of one behind, of its opposite, relative to the front.
+    fn front_turn_rad(self, ray: &RayRow) -> f64 {
+        let turn_rad = self.turn_rad(ray);
+        if self.is_behind(ray) {
+            turn_rad - PI.copysign(turn_rad)
+        } else {
+            turn_rad
+        }
+    }
+
+    /// Whether the scanner can have gone from one ray to the next within a scan: it comes to the other side over the zenith alone.
+    fn goes_on(self, before: &RayRow, next: &RayRow) -> bool {
+        let step_rad = self.elevation_rad(next) - self.elevation_rad(before);
+        let is_in_front = !self.is_behind(before) && !self.is_behind(next);
+        is_in_front || step_rad.abs() <= FRAC_PI_4
+    }
+}
+
+/// Rays that follow each other in one plane.
+struct Run<'r> {
+    plane: Plane,
+    /// Least and largest component across the plane.
+    across: (f64, f64),
+    rays: Vec<&'r RayRow>,
+}
+
+impl<'r> Run<'r> {
+    fn new(plane: Plane) -> Self {
+        Self {
+            plane,
+            across: (f64::INFINITY, f64::NEG_INFINITY),
+            rays: Vec::new(),
+        }
+    }
+
+    /// Whether rays can follow its last one in its plane.
+    fn takes(&self, rays: &[&RayRow]) -> bool {
+        let (low, high) = self.across_with(rays);
+        let ends = self.rays.last().zip(rays.first());
+        let goes_on = ends.is_none_or(|(before, next)| self.plane.goes_on(before, next));
+        goes_on && high - low <= SPREAD_RAD
+    }
+
+    fn across_with(&self, rays: &[&RayRow]) -> (f64, f64) {
+        let across = rays.iter().map(|ray| self.plane.across(ray));
+        across.fold(self.across, |(low, high), across| {
+            (low.min(across), high.max(across))
+        })
+    }
+
+    fn add(&mut self, rays: &[&'r RayRow]) {
+        self.across = self.across_with(rays);
+        self.rays.extend(rays);
+    }
+
+    /// The scans of the run, without rays of isolated elevation.
+    fn scans(&self) -> Vec<PlaneScan> {
+        let elevations = |rays: &[&RayRow]| -> Vec<f64> {
+            rays.iter()
+                .map(|ray| self.plane.elevation_rad(ray))
+                .collect()
+        };
+        let is_isolated = isolated(&elevations(&self.rays));
+        let with_steps = self.rays.iter().zip(is_isolated);
+        let rays: Vec<&RayRow> = with_steps
+            .filter_map(|(ray, is_isolated)| (!is_isolated).then_some(*ray))
+            .collect();
+        let parts = between_turns(&elevations(&rays));
+        parts
+            .into_iter()
+            .filter_map(|part| in_one_plane(self.plane, &rays[part]))
+            .collect()
+    }
+}
+
+/// The scans of rays in the order in which they were measured.
+///
+/// # Errors
+/// Elevations that are impossible, as of another unit; rays of all azimuths.
+pub(super) fn in_order(rays: Vec<RayRow>) -> Result<Split, String> {
+    split(rays, |rays| {
+        runs(rays).iter().flat_map(Run::scans).collect()
+    })
+}
+
+/// The scans of rays in any order, one for each plane.
+///
+/// # Errors
+/// Elevations that are impossible, as of another unit; rays of all azimuths.
+pub(super) fn in_any_order(rays: Vec<RayRow>) -> Result<Split, String> {
+    split(rays, by_plane)
+}
+
+/// The scans that `find` makes of the possible rays.
+fn split(
+    mut rays: Vec<RayRow>,
+    find: impl FnOnce(&[RayRow]) -> Vec<PlaneScan>,
+) -> Result<Split, String> {
+    let mut skipped = Vec::new();
+    skipped.extend(drop_impossible(&mut rays)?);
+    let (count, azimuths) = (rays.len(), azimuths_degrees(&rays));
+    let scans = find(&rays);
+    if scans.is_empty() {
+        if let Some((low, high)) = azimuths {
+            return Err(format!(
+                "it has azimuths from {low:.2} to {high:.2} degrees; a scan in elevation (RHI) has one"
+            ));
+        }
+        // Few lines: whoever makes the map of them says what it needs.
+        let azimuth_rad = Some(Plane::first_of(&rays).azimuth_rad).filter(|a| a.is_finite());
+        return Ok((vec![PlaneScan { azimuth_rad, rays }], skipped));
+    }
+    let used: usize = scans.iter().map(|scan| scan.rays.len()).sum();
+    if used < count {
+        let outside = count - used;
+        skipped.push(format!(
+            "{outside} of {count} rays lie outside its scans in elevation (RHI){}",
+            at_azimuths(&scans)
+        ));
+    }
+    Ok((scans, skipped))
+}
+
+/// The azimuths of scans in words, if they are known.
+fn at_azimuths(scans: &[PlaneScan]) -> String {
+    let degrees = |scan: &PlaneScan| Some(format!("{:.1}", scan.azimuth_rad?.to_degrees()));
+    let azimuths: BTreeSet<String> = scans.iter().filter_map(degrees).collect();
+    if azimuths.is_empty() {
+        return String::new();
+    }
+    let azimuths: Vec<String> = azimuths.into_iter().collect();
+    format!(" at azimuth {} degrees", azimuths.join(", "))
+}
+
+/// Removes rays without a possible elevation, in words; elevations below the horizon may count on from 270 degrees.
+///
+/// # Errors
+/// So many that the unit must be another one.
+fn drop_impossible(rays: &mut Vec<RayRow>) -> Result<Option<String>, String> {
+    let all = rays.len();
+    for ray in rays.iter_mut() {
+        if (TAU - FRAC_PI_2..=TAU).contains(&ray.elevation_rad) {
+            ray.elevation_rad -= TAU;
+        }
+    }
+    let is_impossible =
+        |ray: &&RayRow| !ray.elevation_rad.is_nan() && !ALLOWED_RAD.contains(&ray.elevation_rad);
+    let count = rays.iter().filter(is_impossible).count();
+    if let Some(bad) = rays.iter().find(is_impossible)
+        && count as f64 > (IMPOSSIBLE * all as f64).max(1.0)
+    {
+        return Err(format!(
+            "elevation is {} degrees: from -90 to 180 are allowed, beyond 90 to the other side",
+            bad.elevation_rad.to_degrees()
+        ));
+    }
+    rays.retain(|ray| ALLOWED_RAD.contains(&ray.elevation_rad));
+    let skipped = all - rays.len();
+    Ok((skipped > 0)
+        .then(|| format!("{skipped} of {all} rays have no elevation from -90 to 180 degrees")))
+}
+
+/// Rays that follow each other in one plane, where they can be a scan; a few rays between two such are skipped.
+fn runs(rays: &[RayRow]) -> Vec<Run<'_>> {
+    let mut all: Vec<Run<'_>> = Vec::new();
+    for (i, ray) in rays.iter().enumerate() {
+        match all.last_mut().filter(|run| run.takes(&[ray])) {
+            Some(run) => run.add(&[ray]),
+            None => {
+                let mut run = Run::new(Plane::first_of(&rays[i..]));
+                run.add(&[ray]);
+                all.push(run);
+            }
+        }
+    }
+    let mut kept: Vec<Run<'_>> = Vec::new();
+    let mut between = 0;
+    for run in all {
+        if !can_be_a_scan(&run.rays) {
+            between += run.rays.len();
+            continue;
+        }
+        let is_near = between <= MOST_BETWEEN;
+        match kept
+            .last_mut()
+            .filter(|last| is_near && last.takes(&run.rays))
+        {
+            Some(last) => last.add(&run.rays),
+            None => kept.push(run),
+        }
+        between = 0;
+    }
+    kept
+}
+
+/// Rays of one side of a plane each, in the order in which they first come; both sides are one scan if both reach up to the zenith.
+fn by_plane(rays: &[RayRow]) -> Vec<PlaneScan> {
+    let mut sides: Vec<Run<'_>> = Vec::new();
+    for ray in rays {
+        let has = |side: &&mut Run<'_>| {
+            side.plane.across(ray).abs() <= OFF_PLANE_RAD && !side.plane.is_behind(ray)
+        };
+        match sides.iter_mut().find(has) {
+            Some(side) => side.rays.push(ray),
+            None => {
+                let mut side = Run::new(Plane::first_of([ray]));
+                side.rays.push(ray);
+                sides.push(side);
+            }
+        }
+    }
+    let mut scans = Vec::new();
+    while !sides.is_empty() {
+        let Run {
+            plane, mut rays, ..
+        } = sides.remove(0);
+        let is_back = |side: &Run<'_>| {
+            let first = side.rays[0];
+            plane.is_behind(first) && plane.across(first).abs() <= OFF_PLANE_RAD
+        };
+        if let Some(back) = sides.iter().position(is_back)
+            && reaches_up(&rays)
+            && reaches_up(&sides[back].rays)
+        {
+            rays.extend(sides.remove(back).rays);
+        }
+        scans.extend(in_one_plane(plane, &rays));
+    }
+    scans
+}
+
+fn reaches_up(rays: &[&RayRow]) -> bool {
+    rays.iter().any(|ray| ray.elevation_rad > FRAC_PI_4)
+}
+
+/// The scan of rays near a plane: its azimuth is their median, and those too far from it are skipped; none where no plane is theirs.
+fn in_one_plane(near: Plane, rays: &[&RayRow]) -> Option<PlaneScan> {
+    let directed = rays.iter().filter(|ray| is_directed(ray));
+    let mut turns_rad: Vec<f64> = directed.map(|ray| near.front_turn_rad(ray)).collect();
+    turns_rad.sort_by(f64::total_cmp);
+    let turn_rad = turns_rad.get(turns_rad.len() / 2).copied();
+    let plane = Plane {
+        azimuth_rad: turn_rad.map_or(f64::NAN, |turn_rad| near.azimuth_rad + turn_rad),
+    };
+    let is_in_it = |ray: &&&RayRow| plane.across(ray).abs() <= OFF_PLANE_RAD;
+    let rays = rays.iter().filter(is_in_it);
+    let spread = extent(rays.clone().map(|ray| plane.across(ray)));
+    let rays: Vec<RayRow> = rays
+        .map(|ray| RayRow {
+            elevation_rad: plane.elevation_rad(ray),
+            ..(*ray).clone()
+        })
+        .collect();
+    let is_flat = FLATNESS * spread <= extent(rays.iter().map(|ray| ray.elevation_rad));
+    (is_flat && can_be_a_scan(&rays.iter().collect::<Vec<_>>())).then(|| PlaneScan {
+        azimuth_rad: turn_rad.map(|_| plane.azimuth_rad.rem_euclid(TAU)),
+        rays,
+    })
+}
+
+/// Largest value less the smallest one; negative without any.
+fn extent(values: impl Iterator<Item = f64>) -> f64 {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    high - low
+}
+
+/// Whether the azimuth of a ray is known and says something.
+fn is_directed(ray: &RayRow) -> bool {
+    ray.azimuth_rad.is_finite() && ray.elevation_rad.cos().abs() > NEAR_ZENITH
+}
+
+/// Whether rays have enough elevations that differ.
+fn can_be_a_scan(rays: &[&RayRow]) -> bool {
+    let mut all: Vec<f64> = rays.iter().map(|ray| ray.elevation_rad).collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    all.len() >= FEWEST_LINES && extent(all.into_iter()) >= LEVEL_RAD
+}
+
+/// Least and largest azimuth of rays, degrees, where they are of several planes; the largest may be above 360.
+fn azimuths_degrees(rays: &[RayRow]) -> Option<(f64, f64)> {
+    let first = Plane::first_of(rays);
+    let directed = rays.iter().filter(|ray| is_directed(ray));
+    let turns = directed.map(|ray| first.turn_rad(ray));
+    let (low, high) = turns.fold((0.0_f64, 0.0_f64), |(low, high), turn| {
+        (low.min(turn), high.max(turn))
+    });
+    (high - low > OFF_PLANE_RAD).then(|| {
+        (
+            (first.azimuth_rad + low).to_degrees(),
+            (first.azimuth_rad + high).to_degrees(),
+        )
+    })
+}
+
+/// Angle from one azimuth to another, rad, from -pi to pi.
+fn difference_rad(azimuth_rad: f64, from_rad: f64) -> f64 {
+    (azimuth_rad - from_rad + PI).rem_euclid(TAU) - PI
+}
+
+/// Which elevations are far from those before and after them, which are near each other.
+fn isolated(elevation_rad: &[f64]) -> Vec<bool> {
+    let count = elevation_rad.len();
+    let steps = elevation_rad
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs());
+    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    let Some(step) = steps.get(steps.len() / 2).filter(|_| count >= FEWEST_RAYS) else {
+        return vec![false; count];
+    };
+    let is_isolated = |i: usize| {
+        let [before, after] = match i {
+            0 => [1, 2],
+            last if last + 1 == count => [last - 2, last - 1],
+            middle => [middle - 1, middle + 1],
+        }
+        .map(|neighbour| elevation_rad[neighbour]);
+        let away = (elevation_rad[i] - before)
+            .abs()
+            .min((elevation_rad[i] - after).abs());
+        away > ISOLATED_STEPS * step && (after - before).abs() <= NEIGHBOUR_STEPS * step
+    };
+    (0..count).map(is_isolated).collect()
+}
+
+/// Scans that follow each other: a line that goes back by more than a tenth of all elevations begins another.
+fn between_turns(elevation_rad: &[f64]) -> Vec<Range<usize>> {
+    let back = TURN * extent(elevation_rad.iter().copied());
+    let mut out = Vec::new();
+    let (mut first, mut extreme, mut direction) = (0, 0, 0.0);
+    for i in 1..elevation_rad.len() {
+        let step = elevation_rad[i] - elevation_rad[extreme];
+        if direction == 0.0 {
+            if step.abs() > back {
+                direction = step.signum();
+                extreme = i;
+            }
+        } else if step * direction >= 0.0 {
+            extreme = i;
+        } else if step.abs() > back {
+            out.push(first..extreme + 1);
+            (first, direction) = (extreme + 1, 0.0);
+            // What goes on the same way after a jump back is a scan, too.
+            extreme = first;
+        }
+    }
+    out.push(first..elevation_rad.len());
+    out
+}
+
+/// Whether two scans are of one plane: of one place and one azimuth, as far as these are known.
+#[must_use]
+pub fn are_of_one_plane(one: &ReadScan, other: &ReadScan) -> bool {
+    let is_one_azimuth = match (one.azimuth_rad, other.azimuth_rad) {
+        (Some(one), Some(other)) => difference_rad(one, other).abs() <= SAME_PLANE_RAD,
+        (one, other) => one == other,
+    };
+    let is_one_place = match (one.place_deg, other.place_deg) {
+        (Some(one), Some(other)) => one
+            .iter()
+            .zip(other)
+            .all(|(one, other)| (one - other).abs() <= SAME_PLACE_DEG),
+        (one, other) => one == other,
+    };
+    is_one_azimuth && is_one_place
+}
+
+/// Numbers the planes of scans from 0 in the order in which they first come.
+#[must_use]
+pub fn plane_numbers<'s>(scans: impl IntoIterator<Item = &'s ReadScan>) -> Vec<usize> {
+    let mut firsts: Vec<&ReadScan> = Vec::new();
+    let number = |scan: &'s ReadScan| {
+        let known = firsts
+            .iter()
+            .position(|first| are_of_one_plane(first, scan));
+        known.unwrap_or_else(|| {
+            firsts.push(scan);
+            firsts.len() - 1
+        })
+    };
+    scans.into_iter().map(number).collect()
+}
+
+/// Turns scans over the zenith that look back in the plane of one before, so that all of a plane have one azimuth.
+pub fn face_alike(scans: &mut [&mut ReadScan]) {
+    for i in 0..scans.len() {
+        let (before, rest) = scans.split_at_mut(i);
+        let scan = &mut *rest[0];
+        if !is_over_zenith(scan) {
+            continue;
+        }
+        let turned = turned(scan);
+        let faces =
+            |other: &&mut ReadScan| is_over_zenith(other) && are_of_one_plane(other, &turned);
+        if before.iter().any(faces) {
+            *scan = turned;
+        }
+    }
+}
+
+fn is_over_zenith(scan: &ReadScan) -> bool {
+    let elevation_rad = &scan.map.elevation_rad;
+    let ends = elevation_rad.first().zip(elevation_rad.last());
+    ends.is_some_and(|(first, last)| *first < FRAC_PI_2 && *last > FRAC_PI_2)
+}
+
+/// A scan as it is with the opposite azimuth.
+fn turned(scan: &ReadScan) -> ReadScan {
+    let map = &scan.map;
+    let backwards = |values: &Array2<f64>| values.slice(s![..;-1, ..]).to_owned();
+    ReadScan {
+        azimuth_rad: scan
+            .azimuth_rad
+            .map(|azimuth_rad| (azimuth_rad + PI).rem_euclid(TAU)),
+        map: ScanMap {
+            elevation_rad: map.elevation_rad.iter().rev().map(|e| PI - e).collect(),
+            time_s: map.time_s.iter().rev().copied().collect(),
+            range_m: map.range_m.clone(),
+            velocity_m_s: backwards(&map.velocity_m_s),
+            sigma_m_s: map.sigma_m_s.as_ref().map(backwards),
+            fold_m_s: map.fold_m_s,
+        },
+        ..scan.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rays at azimuths and elevations in degrees; each has its number as time.
+    fn rays(directions: impl IntoIterator<Item = (f64, f64)>) -> Vec<RayRow> {
+        let ray = |(i, (azimuth, elevation)): (usize, (f64, f64))| RayRow {
+            elevation_rad: elevation.to_radians(),
+            azimuth_rad: azimuth.to_radians(),
+            time_s: i as f64,
+            velocity_m_s: vec![1.0; 3],
+            sigma_m_s: Vec::new(),
+        };
+        directions.into_iter().enumerate().map(ray).collect()
+    }
+
+    /// Elevations 2 to 14 degrees at an azimuth.
+    fn up(azimuth: f64) -> impl DoubleEndedIterator<Item = (f64, f64)> + Clone {
+        (10..=70).map(move |i| (azimuth, 0.2 * f64::from(i)))
+    }
+
+    /// Azimuth, first and last elevation in degrees, and number of rays of each scan.
+    fn summary(scans: &[PlaneScan]) -> Vec<(i64, i64, i64, usize)> {
+        let degrees = |rad: f64| rad.to_degrees().round() as i64;
+        let of = |scan: &PlaneScan| {
+            let ends = [&scan.rays[0], &scan.rays[scan.rays.len() - 1]];
+            let [first, last] = ends.map(|ray| degrees(ray.elevation_rad));
+            let azimuth = scan.azimuth_rad.map_or(-1, degrees);
+            (azimuth, first, last, scan.rays.len())
+        };
+        scans.iter().map(of).collect()
+    }
+
+    #[test]
+    fn scans_end_where_the_elevation_turns() {
+        let up = |n: usize| (0..n).map(|i| 0.01 * i as f64);
+        let both: Vec<f64> = up(20).chain(up(20).rev().skip(1)).collect();
+        assert_eq!(between_turns(&both), [0..20, 20..39]);
+        let again: Vec<f64> = up(20).chain(up(20)).chain(up(20)).collect();
+        assert_eq!(between_turns(&again), [0..20, 20..40, 40..60]);
+        let mut shaky: Vec<f64> = up(20).collect();
+        shaky[7] -= 0.011;
+        assert_eq!(
+            between_turns(&shaky),
+            vec![std::ops::Range { start: 0, end: 20 }]
+        );
+    }
+
+    #[test]
+    fn planes_in_turn_are_scans_of_their_own_and_rays_between_them_are_counted() {
+        let way = [(40.0, 0.0), (62.3, 0.0), (84.4, 0.0)];
+        let between = [(97.0, 11.0), (108.0, 6.0)];
+        let all = way
+            .into_iter()
+            .chain(up(90.0))
+            .chain(between)
+            .chain(up(120.0));
+        let all = all
+            .chain(up(270.0).rev())
+            .chain(up(90.0))
+            .chain(up(90.0).rev().skip(1));
+        let (scans, skipped) = in_order(rays(all)).unwrap();
+        let expected = [
+            (90, 2, 14, 61),
+            (120, 2, 14, 61),
+            (270, 14, 2, 61),
+            (90, 2, 14, 61),
+            (90, 14, 2, 60),
+        ];
+        assert_eq!(summary(&scans), expected);
+        assert_eq!(
+            skipped,
+            [
+                "5 of 309 rays lie outside its scans in elevation (RHI) at azimuth 120.0, 270.0, 90.0 degrees"
+            ]
+        );
+    }
+
+    #[test]
+    fn rays_beside_the_plane_and_isolated_or_impossible_elevations_are_skipped() {
+        let mut all: Vec<(f64, f64)> = up(90.0).collect();
+        all[20].0 = 101.0;
+        all[30].1 = 45.0;
+        all[40].1 = f64::NAN;
+        all[50].1 = 200.0;
+        all.insert(0, (88.5, 1.9));
+        let (scans, skipped) = in_order(rays(all)).unwrap();
+        assert_eq!(summary(&scans), [(90, 2, 14, 57)]);
+        assert_eq!(
+            skipped,
+            [
+                "2 of 62 rays have no elevation from -90 to 180 degrees",
+                "3 of 60 rays lie outside its scans in elevation (RHI) at azimuth 90.0 degrees"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_scan_over_the_zenith_is_one_with_elevations_beyond_it_in_any_order() {
+        let jitter = |i: i32| 0.05 * f64::from(i % 3 - 1);
+        let flipped = (12..=168).step_by(2).map(|e| match e > 90 {
+            true => (190.0 + jitter(e), 180.0 - f64::from(e)),
+            false => (10.0 - 360.0 + jitter(e), f64::from(e)),
+        });
+        let there: Vec<(f64, f64)> = flipped.collect();
+        let back: Vec<(f64, f64)> = there.iter().rev().skip(1).copied().collect();
+        let all = [there.clone(), back].concat();
+        let (scans, skipped) = in_order(rays(all)).unwrap();
+        assert_eq!(summary(&scans), [(10, 12, 168, 79), (10, 166, 12, 78)]);
+        assert!(skipped.is_empty());
+        let azimuth_rad = scans[0].azimuth_rad.unwrap();
+        assert!(
+            (azimuth_rad - 10f64.to_radians()).abs() < 1e-9,
+            "{azimuth_rad}"
+        );
+        let shuffled: Vec<(f64, f64)> = (0..79).map(|i| there[i * 7 % 79]).collect();
+        let (scans, _) = in_any_order(rays(shuffled)).unwrap();
+        assert_eq!((scans.len(), scans[0].rays.len()), (1, 79));
+        // Scans of both sides that do not come near the zenith are two.
+        let (scans, _) = in_order(rays(up(10.0).chain(up(190.0).rev()))).unwrap();
+        assert_eq!(summary(&scans), [(10, 2, 14, 61), (190, 14, 2, 61)]);
+        let (scans, _) = in_any_order(rays(up(10.0).chain(up(190.0)))).unwrap();
+        assert_eq!(summary(&scans), [(10, 2, 14, 61), (190, 2, 14, 61)]);
+    }
+
+    #[test]
+    fn azimuths_about_north_are_one_plane_and_those_of_a_degree_are_two() {
+        let about = up(0.0)
+            .enumerate()
+            .map(|(i, (_, e))| (if i % 2 == 0 { 359.9 } else { 0.1 }, e));
+        let (scans, skipped) = in_order(rays(about)).unwrap();
+        assert_eq!(
+            (scans.len(), scans[0].rays.len(), skipped.len()),
+            (1, 61, 0)
+        );
+        let (scans, _) = in_order(rays(up(359.0).chain(up(1.0).rev()))).unwrap();
+        assert_eq!(summary(&scans), [(359, 2, 14, 61), (1, 14, 2, 61)]);
+        let scan = |azimuth: f64| ReadScan {
+            azimuth_rad: Some(azimuth.to_radians()),
+            ..ReadScan::new(
+                std::path::Path::new("x"),
+                0,
+                ScanMap {
+                    elevation_rad: vec![],
+                    time_s: vec![],
+                    range_m: vec![],
+                    velocity_m_s: Array2::zeros((0, 0)),
+                    sigma_m_s: None,
+                    fold_m_s: None,
+                },
+            )
+        };
+        let scans = [359.0, 1.0, -1.0, 359.9, 0.1, 361.0].map(scan);
+        assert_eq!(plane_numbers(&scans), [0, 1, 0, 2, 2, 1]);
+    }
+
+    #[test]
+    fn cuts_at_one_elevation_and_elevations_of_another_unit_are_no_scans() {
+        let ppi = (0..90).map(|i| (4.0 * f64::from(i), 3.0));
+        let reason = in_order(rays(ppi.clone())).unwrap_err();
+        assert!(
+            reason.contains("it has azimuths from") && reason.contains("RHI"),
+            "{reason}"
+        );
+        let slow = (0..90).map(|i| (0.3 * f64::from(i), 3.0));
+        let (scans, skipped) =
+            in_order(rays(up(90.0).chain(slow.clone()).chain(up(90.0)))).unwrap();
+        assert_eq!(summary(&scans), [(90, 2, 14, 61), (90, 2, 14, 61)]);
+        assert!(skipped[0].starts_with("90 of 212 rays"), "{skipped:?}");
+        // Azimuth and elevation turn together.
+        let spiral = (0..90).map(|i| (0.3 * f64::from(i), 3.0 + 0.2 * f64::from(i)));
+        assert!(in_order(rays(spiral)).unwrap_err().contains("azimuths"));
+        let mut degrees = rays(up(90.0));
+        degrees
+            .iter_mut()
+            .for_each(|ray| ray.elevation_rad = ray.elevation_rad.to_degrees());
+        assert!(in_order(degrees).unwrap_err().contains("elevation is"));
+        let below = (0..61).map(|i| (90.0, (352.0 + 0.2 * f64::from(i)) % 360.0));
+        let (scans, _) = in_order(rays(below)).unwrap();
+        assert_eq!(summary(&scans), [(90, -8, 4, 61)]);
+    }
+}
