@@ -5,11 +5,12 @@
 //! Check: the reference maps; scatter, bias and stated deviations over many maps.
 
 use crate::error::Error;
+use crate::retrieval::aliases::{self, CALM, Unfolded};
 use crate::retrieval::alternatives::with_alternatives;
 use crate::retrieval::hypotheses::{End, Kind, ROUGH, Stage, least, rivals};
 use crate::retrieval::report::{OUTLIER, Report};
 use crate::retrieval::whitening::Whitening;
-use crate::retrieval::{Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
+use crate::retrieval::{Flag, Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
 use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::{Loss, Wake};
@@ -18,6 +19,8 @@ use crate::vortex_fit::{Loss, Wake};
 const WHITENED: usize = 1500;
 pub(super) const MOST: usize = 16_000;
 const SEARCHED: usize = 1200;
+/// Most winds that are assumed in turn.
+const OTHER_WINDS: usize = 3;
 /// A statistic below this part of the threshold in medians, which tell two thirds of what all velocities do, is no wake.
 const NOTHING: f64 = 0.5;
 
@@ -29,13 +32,30 @@ const NOTHING: f64 = 0.5;
 pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
     options.validate()?;
     map.validate()?;
-    let unfolded = map.unfolded();
-    let bounded = unfolded.medians(if options.turbulence.is_some() {
+    let mut unfolded = Unfolded::new(map, options)?;
+    let mut options = options.clone();
+    for _ in 0..OTHER_WINDS {
+        let (result, better) = fit_unfolded(&unfolded, &options)?;
+        let Some((wake, movement)) = better else {
+            return Ok(result);
+        };
+        unfolded = unfolded.about(&wake, &options);
+        options.movement = movement;
+    }
+    Ok(fit_unfolded(&unfolded, &options)?.0)
+}
+
+/// The result in the assumed wind, and a wake in another wind that explains the velocities better, with its movement.
+fn fit_unfolded(
+    unfolded: &Unfolded,
+    options: &RetrievalOptions,
+) -> Result<(ScanResult, Option<(Wake, Movement)>), Error> {
+    let bounded = unfolded.map.medians(if options.turbulence.is_some() {
         WHITENED
     } else {
         MOST
     });
-    let map = bounded.as_ref().unwrap_or(&unfolded);
+    let map = bounded.as_ref().unwrap_or(&unfolded.map);
     // broad blocks are enough to search in
     let few = map.medians(SEARCHED);
     let (gates, sought) = (Gates::rough(map, options)?, few.as_ref().unwrap_or(map));
@@ -44,11 +64,12 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
         Stage::new(map, options, &gates),
         Stage::new(sought, options, &sought_gates),
     );
-    let starts = search.starts()?;
-    let about = starts.first().map_or(
-        Wake::from_array(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]),
-        |s| s.1,
-    );
+    let mut starts = search.starts()?;
+    for (_, start) in &mut starts {
+        *start = unfolded.with_wind(start);
+    }
+    let nothing = unfolded.with_wind(&Wake::from_array(&CALM));
+    let about = starts.first().map_or(nothing, |s| s.1);
     if map.sigma_m_s.is_none() {
         // what the wind leaves, until fits are known
         let winds = (search.wind(&about)?, all.wind(&about)?);
@@ -79,26 +100,40 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     let stage = all.through(&dense);
     let mut ends = stage.onwards(&rivals(&ends, scale), |_| ROUGH);
     let may_stand = options.movement == Movement::Auto && dense.seconds.is_some();
+    let still = stage.clone().through(&frozen);
     let standing = if may_stand {
-        ends_at_rest(&stage, &stage.clone().through(&frozen), &ends, scale)
+        ends_at_rest(&stage, &still, &ends, scale)
     } else {
         None
     };
+    let at_rest = if map.fold_m_s.is_some() && may_stand {
+        still.onwards(&ends, |_| ROUGH)
+    } else {
+        Vec::new()
+    };
+    let better = aliases::better([(&stage, &ends[..]), (&still, &at_rest)], scale);
     let fine = if standing.is_some() {
         frozen.clone()
     } else {
         moving
     }
     .fine(&options.gate)?;
+    let chosen = if standing.is_some() { &still } else { &stage };
     ends = standing.unwrap_or(ends);
+    ends.extend(aliases::rivals(chosen, &ends, scale));
     let stage = stage.through(&fine);
     let (wind, ends) = (stage.wind(&about)?, stage.fine(&ends));
-    with_alternatives(&Report {
+    let (wind, other_wind_competes) = aliases::best_wind(&stage, wind, scale);
+    let mut result = with_alternatives(&Report {
         stage: &stage,
         scale,
         wind: &wind,
         ends: &ends,
-    })
+    })?;
+    if result.wake.is_none() {
+        result.set(Flag::Ambiguous, other_wind_competes);
+    }
+    Ok((result, better))
 }
 
 /// The ends in all velocities that come of a search, whose blocks stand for them if they are many.

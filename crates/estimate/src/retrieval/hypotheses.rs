@@ -33,7 +33,7 @@ const SAME: f64 = 1e-4;
 const ROUGHLY: f64 = 1e-3;
 const NEARLY: f64 = 5e-3;
 /// A rough end so much above the best of its kind competes no longer.
-const HOPELESS: f64 = 50.0;
+pub(crate) const HOPELESS: f64 = 50.0;
 
 const FAR: Stop = Stop {
     iterations: 25,

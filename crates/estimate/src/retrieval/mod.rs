@@ -4,6 +4,8 @@
 //! |---|---|
 //! | `scan_map`, `options`, `result` | what goes in, how, what comes out |
 //! | `fit`, `hypotheses`, `report` | fits of wind alone, one vortex and two; which it is; deviations and flags |
+//! | `aliases` | winds beyond the interval in which velocities are told apart |
+//! | `plausible` | what the vortices of an aircraft can be |
 //! | `gates`, `whitening` | what a velocity is of the air; correlated velocities |
 //! | `secondary` | the fit again with secondary vortices, if the scan shows them |
 //! | `radial_velocity`, `envelope` | the methods of the literature beside it, with their errors |
@@ -24,12 +26,14 @@
 //! # Ok::<(), wakescope_estimate::Error>(())
 //! ```
 
+mod aliases;
 mod alternatives;
 mod envelope;
 mod fit;
 mod gates;
 mod hypotheses;
 mod options;
+mod plausible;
 mod radial_velocity;
 mod report;
 mod result;
@@ -43,6 +47,7 @@ pub use envelope::{EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelope
 pub use fit::fit_scan;
 pub use gates::expected_velocities;
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
+pub use plausible::without_implausible_vortices;
 pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, Measured, ScanResult, Side, VortexResult};
 pub use scan_map::ScanMap;

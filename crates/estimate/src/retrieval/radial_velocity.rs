@@ -9,6 +9,7 @@
 use ndarray::Array2;
 
 use crate::error::{Error, enough_velocities};
+use crate::retrieval::aliases::{CALM, Unfolded};
 use crate::retrieval::hypotheses::{End, Kind, Stage};
 use crate::retrieval::report::{Chosen, Report};
 use crate::retrieval::{Measured, Movement, RetrievalOptions, ScanMap, ScanResult};
@@ -45,11 +46,12 @@ pub fn radial_velocity_method(
         core_prior: None,
         ..options.clone()
     };
-    let unfolded = map.unfolded();
+    let unfolded = Unfolded::new(map, options)?;
+    let nothing = unfolded.with_wind(&Wake::from_array(&CALM));
+    let unfolded = unfolded.map;
     let gates = Gates::rough(&unfolded, &linear)?.fine(&linear.gate)?;
     let mut stage = Stage::new(&unfolded, &linear, &gates);
     (stage.squares.loss, stage.is_noise_left) = (options.loss, false);
-    let nothing = Wake::from_array(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
     if map.sigma_m_s.is_none() {
         let calm = stage.wind(&nothing)?;
         stage = stage.rescaled(&calm);

@@ -151,6 +151,8 @@ impl VortexResult {
 pub enum Flag {
     /// No wake was found.
     NoWake,
+    /// The vortices that explain the scan best are none of an aircraft, or the scan does not resolve them.
+    Implausible,
     /// One vortex only is in view.
     OneVortex,
     /// The core radius is not of this scan.
@@ -177,6 +179,16 @@ pub enum Flag {
     Thinned,
     /// The fit came to no end: what is told is where it was.
     NotConverged,
+}
+
+impl Flag {
+    /// Whether the flag is about the scan and its fit, not about vortices.
+    pub(crate) fn is_of_scan(self) -> bool {
+        matches!(
+            self,
+            Self::PoorFit | Self::Outliers | Self::Thinned | Self::NotConverged
+        )
+    }
 }
 
 /// Outcome of a retrieval from one scan.

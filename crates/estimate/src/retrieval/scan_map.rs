@@ -5,8 +5,8 @@
 use ndarray::Array2;
 
 use crate::error::{Error, finite, length, positive};
-use crate::vortex_fit::VelocityMap;
 use crate::vortex_fit::map_fit::data::{block_means, median};
+use crate::vortex_fit::{VelocityMap, Wake, WakeModel};
 
 /// Deviation of the median of many normal numbers over that of their mean.
 const MEDIAN_OVER_MEAN: f64 = 1.253_314_137_315_500_3;
@@ -61,6 +61,20 @@ impl ScanMap {
             unfolded
                 .velocity_m_s
                 .mapv_inplace(|v| v - fold * ((v - middle) / fold).round());
+        }
+        unfolded
+    }
+
+    /// The map with velocities that repeat put about those of a wake.
+    pub(crate) fn unfolded_about(&self, model: &WakeModel, wake: &Wake) -> Self {
+        let mut unfolded = self.clone();
+        let Some(fold) = self.fold_m_s else {
+            return unfolded;
+        };
+        for ((line, gate), velocity) in unfolded.velocity_m_s.indexed_iter_mut() {
+            let (range_m, elevation_rad) = (self.range_m[gate], self.elevation_rad[line]);
+            let away_m_s = *velocity - model.radial_velocity_m_s(wake, range_m, elevation_rad);
+            *velocity -= fold * (away_m_s / fold).round();
         }
         unfolded
     }

@@ -42,7 +42,7 @@ pub fn with_secondary_vortices(
         correlated_lines: map.elevation_rad.len(),
         ..MapFitOptions::default()
     };
-    let unfolded = map.unfolded();
+    let unfolded = map.unfolded_about(&options.model, &pair);
     let bounded = unfolded.medians(MOST);
     let sought = bounded.as_ref().unwrap_or(&unfolded);
     let gates = Gates::rough(sought, options)?;

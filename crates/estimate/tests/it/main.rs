@@ -22,5 +22,6 @@ mod shown_maps;
 mod sliding;
 mod vortex_fit;
 mod wake_detection;
+mod wind_aliases;
 mod wind_profile;
 mod window_worth;

@@ -308,20 +308,22 @@ fn of_map(
         start,
         ..words.options(scene, gate)
     };
-    let found = retrieve::retrieve_map(scan, words.method, options, velocities)?;
+    let (found, implausible) = retrieve::retrieve_map(scan, words.method, options, velocities)?;
     let lost = "it is a map of this program that has lost its scene, as some programs drop it: the estimator is taken for the default one, and \
                 the deviations hold what means would differ by; --scene gives the circulations of the original";
     let taken = found.result.has(Flag::TakenForMeans);
-    for remark in [
-        remark,
-        taken.then_some(if is_likely { lost } else { UNKNOWN }),
-    ]
-    .into_iter()
-    .flatten()
-    {
+    let taken = taken.then_some(if is_likely { lost } else { UNKNOWN });
+    let implausible = implausible.map(|reason| no_wake_since(&found.scan, &reason));
+    let remarks = [remark, taken, implausible.as_deref()];
+    for remark in remarks.into_iter().flatten() {
         observer.warn(&format!("{}: {remark}", found.scan.path.display()));
     }
     Ok(found)
+}
+
+/// Why the best fit of a scan is no wake, in words.
+fn no_wake_since(scan: &ReadScan, reason: &str) -> String {
+    format!("sweep {}: the best fit is no wake: {reason}", scan.sweep)
 }
 
 fn of_signals(
@@ -343,12 +345,16 @@ fn of_signals(
     for (mut scan, measured) in maps.into_iter().zip(&scans) {
         scan.azimuth_rad = Some(plan.scene.content.scan.azimuth_rad);
         let (gate, _) = gate_of(Some(&scan), words.air.gate_std, Some(&plan.scene.content))?;
-        let mut one = retrieve::retrieve_map(
+        let (mut one, implausible) = retrieve::retrieve_map(
             scan,
             words.method,
             words.options(Some(&plan.scene), gate),
             velocities,
         )?;
+        if let Some(reason) = implausible {
+            let path = one.scan.path.display();
+            observer.warn(&format!("{path}: {}", no_wake_since(&one.scan, &reason)));
+        }
         let lines = first_line..first_line + measured.lines.elevation_rad.len();
         first_line = lines.end;
         match (&own, words.method) {

@@ -17,7 +17,7 @@ use crate::{Error, SPEED_OF_LIGHT_M_S};
 use ndarray::Array2;
 use wakescope_estimate::retrieval::{
     Flag, Gate, RetrievalOptions, ScanMap, ScanResult, fit_scan, radial_velocity_method,
-    with_secondary_vortices,
+    with_secondary_vortices, without_implausible_vortices,
 };
 use wakescope_estimate::vortex_fit::{CorePrior, RangeKernel, Sharing, WakeModel};
 
@@ -144,11 +144,24 @@ pub enum Velocities<'s> {
 /// Retrieves one map.
 ///
 /// Where it is known what an estimator shows, means only lead to the start of the fit: taken for means, peaks mislead about the core above
-/// all, which is a typical one until then. Secondary vortices that the map shows are in the options that come back.
+/// all, which is a typical one until then. Secondary vortices that the map shows are in the options that come back. Vortices that no
+/// aircraft makes are no wake; the text says why.
 ///
 /// # Errors
 /// What the fits refuse, with the file and the sweep.
 pub fn retrieve_map(
+    scan: ReadScan,
+    method: Method,
+    options: RetrievalOptions,
+    velocities: Velocities<'_>,
+) -> Result<(RetrievedScan, Option<String>), Error> {
+    let mut found = fitted(scan, method, options, velocities)?;
+    let (map, model) = (&found.scan.map, &found.options.model);
+    let reason = without_implausible_vortices(&mut found.result, map, model);
+    Ok((found, reason))
+}
+
+fn fitted(
     scan: ReadScan,
     method: Method,
     options: RetrievalOptions,

@@ -110,7 +110,10 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
                 velocity_m_s,
             )
         };
-        let by = |method| retrieve_map(scan(), method, options.clone(), velocities).ok();
+        let by = |method| {
+            let found = retrieve_map(scan(), method, options.clone(), velocities).ok();
+            found.map(|(found, _)| found)
+        };
         // the fit of the map also starts that of the signals
         let of_map = wanted
             .methods

@@ -1,4 +1,5 @@
-//! `wakescope retrieve` of scans of several planes, over the zenith, with rays between the scans, and of files that cannot be used.
+//! `wakescope retrieve` of scans of several planes, over the zenith, with rays between the scans, of other instruments, and of files that
+//! cannot be used.
 
 use super::wakescope;
 use std::fmt::Write as _;
@@ -371,6 +372,43 @@ fn files_of_a_day_that_cannot_be_used_are_skipped_with_the_reason() {
         assert!(
             message.contains(part) && !folder.join("x").exists(),
             "{message}"
+        );
+    }
+}
+
+/// A weather radar sees rotors of kilometres, which a pair of vortices explains better than a wind.
+#[test]
+fn the_scan_of_a_weather_radar_is_no_wake_and_the_reason_is_given() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    let (model, mut noise) = (WakeModel::default(), Noise(0.3));
+    let rotors = Wake::from_array(&[1e5, 1e5, 9e3, 2e3, 15e3, 2e3, 500.0, 500.0, 4.0, 1e-3]);
+    let mut rows = String::from("range_m,azimuth_deg,elevation_deg,velocity_m_s\n");
+    for (line, gate) in (0..60).flat_map(|line| (0..100).map(move |gate| (line, gate))) {
+        let (range_m, elevation) = (
+            1000.0 + 250.0 * f64::from(gate),
+            0.5 + 0.5 * f64::from(line),
+        );
+        let velocity = model.radial_velocity_m_s(&rotors, range_m, elevation.to_radians());
+        let velocity = velocity + noise.next();
+        let _ = writeln!(rows, "{range_m},0,{elevation},{velocity}");
+    }
+    fs::write(folder.join("radar.csv"), rows).unwrap();
+    for method in ["fit", "rv"] {
+        let (table, warned) = retrieved(
+            folder,
+            &["radar.csv", "--method", method, "--estimator", "means"],
+        );
+        assert_eq!(
+            (table.rows.len(), text(&table, 0, "side")),
+            (1, "none"),
+            "{method}"
+        );
+        let flags = text(&table, 0, "flags");
+        assert!(flags.contains("no_wake implausible"), "{method}: {flags}");
+        assert!(
+            warned.contains("radar.csv: sweep 0: the best fit is no wake: the "),
+            "{method}: {warned}"
         );
     }
 }
