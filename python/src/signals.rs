@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PySlice;
 use std::ops::Range;
 use std::path::Path;
+use wakescope_sim::io::number::middle_code;
 use wakescope_sim::io::raw::{RawRecords, Source};
 
 /// An array \[record, sample\].
@@ -67,12 +68,15 @@ pub(crate) fn samples(array: &Bound<'_, PyAny>) -> PyResult<RawRecords> {
     let records: usize = before.iter().product();
     let plane = array.call_method1("reshape", (records, samples))?;
     let are_integers = kind == "i" || kind == "u";
+    let bytes: i32 = array.getattr("dtype")?.getattr("itemsize")?.extract()?;
     let source = NumpyRecords(plane.unbind());
-    Ok(RawRecords::new(
-        Path::new("signals"),
-        source,
-        [records, samples],
-        kind == "c",
-        are_integers,
-    ))
+    let shape = [records, samples];
+    let out = RawRecords::new(Path::new("signals"), source, shape, kind == "c", are_integers);
+    Ok(RawRecords {
+        zero: match kind.as_str() {
+            "u" if bytes <= 4 => middle_code(8 * bytes),
+            _ => 0.0,
+        },
+        ..out
+    })
 }

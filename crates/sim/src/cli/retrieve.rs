@@ -246,7 +246,7 @@ impl Input {
         scans
             .left_out
             .iter()
-            .for_each(|text| observer.warn(&format!("{}: {text}: left out", path.display())));
+            .for_each(|text| observer.warn(&format!("{}: {text}", path.display())));
         Ok(Self { scans, scene })
     }
 }

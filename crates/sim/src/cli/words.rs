@@ -102,7 +102,7 @@ pub(super) struct ScanWords {
 /// What a file of scans holds.
 pub(super) struct Scans {
     pub(super) maps: Vec<ReadScan>,
-    /// What was left out, in words.
+    /// What was left out or not understood, in words.
     pub(super) left_out: Vec<String>,
     /// The raw signals that the maps are made of.
     pub(super) signals: Option<Signals>,

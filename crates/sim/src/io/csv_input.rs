@@ -1,6 +1,8 @@
 //! Tables of texts from CSV: comment lines begin with `#`, the first other line is the header; quotes as in RFC 4180.
 //!
-//! Check: what the writer of tables makes of any text comes back.
+//! Tables of other programs may have a header that is the last comment before a first line of numbers (`numpy.savetxt`), cells
+//! with semicolons, tabs or blanks between them, decimal commas beside separators that are none, and blanks around cells.
+//! Check: what the writer of tables makes of any text comes back; one table in each of these forms.
 
 use super::{Provenance, text_file};
 use crate::Error;
@@ -15,6 +17,8 @@ pub struct TextTable {
     pub rows: Vec<Vec<String>>,
     /// The comment lines before the header, without their signs.
     pub comment: String,
+    /// Whether a comma in a number is its point.
+    has_decimal_commas: bool,
 }
 
 impl TextTable {
@@ -35,10 +39,22 @@ impl TextTable {
     /// # Errors
     /// As [`TextTable::read`], without the file.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let mut records = records(text.strip_prefix('\u{feff}').unwrap_or(text));
-        let header = records
-            .next()
-            .ok_or("no header: the first line that is no comment names the columns")?;
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let separator = Separator::of(text);
+        let mut records = records(text, separator).peekable();
+        let are_numbers = |cells: &Vec<String>| {
+            let number = |cell: &String| cell.trim().replace(',', ".").parse::<f64>();
+            cells.iter().all(|cell| number(cell).is_ok())
+        };
+        let mut header = match records.peek() {
+            Some(first) if are_numbers(first) => commented_header(text, separator, first.len())?,
+            _ => records
+                .next()
+                .ok_or("no header: the first line that is no comment names the columns")?,
+        };
+        for name in &mut header {
+            *name = name.trim().to_owned();
+        }
         let mut rows = Vec::new();
         for row in records {
             if row.len() != header.len() {
@@ -58,6 +74,7 @@ impl TextTable {
             header,
             rows,
             comment: comment.collect(),
+            has_decimal_commas: separator != Separator::Comma,
         })
     }
 
@@ -82,9 +99,11 @@ impl TextTable {
         }
     }
 
-    /// Place of a column.
+    /// Place of a column, in capital or small letters.
     pub fn column(&self, name: &str) -> Option<usize> {
-        self.header.iter().position(|column| column == name)
+        let is_same = |column: &String| column.eq_ignore_ascii_case(name);
+        let exact = self.header.iter().position(|column| column == name);
+        exact.or_else(|| self.header.iter().position(is_same))
     }
 
     /// Place of the column of an angle, and its unit, rad: that in radians, or else that in degrees.
@@ -97,20 +116,82 @@ impl TextTable {
 
     /// A cell as a number; NaN where it is empty or none.
     pub fn number(&self, row: usize, column: usize) -> f64 {
-        let cell = self.rows.get(row).and_then(|cells| cells.get(column));
-        cell.and_then(|cell| cell.trim().parse().ok())
-            .unwrap_or(f64::NAN)
+        let Some(cell) = self.rows.get(row).and_then(|cells| cells.get(column)) else {
+            return f64::NAN;
+        };
+        let number = match self.has_decimal_commas {
+            true => cell.trim().replace(',', ".").parse(),
+            false => cell.trim().parse(),
+        };
+        number.unwrap_or(f64::NAN)
+    }
+}
+
+/// What is between the cells of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Separator {
+    Comma,
+    Semicolon,
+    Tab,
+    /// One or more.
+    Blanks,
+}
+
+impl Separator {
+    /// That of the first line of cells, a header or numbers.
+    fn of(text: &str) -> Self {
+        let is_cells = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
+        let mut lines = text.lines().filter(is_cells);
+        let first = lines.next().unwrap_or_default();
+        let unquoted: String = first.split('"').step_by(2).collect();
+        if unquoted.contains(';') {
+            return Self::Semicolon;
+        }
+        if unquoted.contains('\t') {
+            return Self::Tab;
+        }
+        // Names may hold blanks, which divide them only where the next line is as many numbers.
+        let count = first.split_whitespace().count();
+        let next: Vec<&str> = lines.next().unwrap_or(first).split_whitespace().collect();
+        let are_numbers = next.iter().all(|word| word.parse::<f64>().is_ok());
+        match count > 1 && next.len() == count && are_numbers {
+            true => Self::Blanks,
+            false => Self::Comma,
+        }
+    }
+
+    fn divides(self, c: char) -> bool {
+        match self {
+            Self::Comma => c == ',',
+            Self::Semicolon => c == ';',
+            Self::Tab => c == '\t',
+            Self::Blanks => c == ' ' || c == '\t',
+        }
+    }
+}
+
+/// The header of a table whose first line are numbers: the last comment before it.
+fn commented_header(text: &str, separator: Separator, count: usize) -> Result<Vec<String>, String> {
+    let comments = text.lines().map_while(|line| line.strip_prefix('#'));
+    let last = comments.last().unwrap_or_default().trim();
+    let names = records(last, separator).next().unwrap_or_default();
+    match names.len() == count {
+        true => Ok(names),
+        false => Err(format!(
+            "no header: its first line has {count} numbers, and the line before it does not name as many columns"
+        )),
     }
 }
 
 /// Records of cells, without comments and empty lines.
-fn records(text: &str) -> impl Iterator<Item = Vec<String>> + '_ {
+fn records(text: &str, separator: Separator) -> impl Iterator<Item = Vec<String>> + '_ {
     let mut chars = text.chars().peekable();
     std::iter::from_fn(move || {
         loop {
             match chars.peek()? {
                 '#' => while chars.next().is_some_and(|c| c != '\n') {},
                 '\n' | '\r' => drop(chars.next()),
+                ' ' if separator == Separator::Blanks => drop(chars.next()),
                 _ => break,
             }
         }
@@ -119,13 +200,20 @@ fn records(text: &str) -> impl Iterator<Item = Vec<String>> + '_ {
             match c {
                 '"' if quoted && chars.peek() == Some(&'"') => cell.extend(chars.next()),
                 '"' => quoted = !quoted,
-                ',' if !quoted => row.push(std::mem::take(&mut cell)),
-                '\r' if !quoted => {}
-                '\n' if !quoted => break,
+                '\r' if !quoted && chars.peek() == Some(&'\n') => {}
+                '\n' | '\r' if !quoted => break,
+                // Blanks together divide once.
+                c if !quoted && separator.divides(c) => {
+                    if separator != Separator::Blanks || !cell.is_empty() {
+                        row.push(std::mem::take(&mut cell));
+                    }
+                }
                 _ => cell.push(c),
             }
         }
-        row.push(cell);
+        if separator != Separator::Blanks || !cell.is_empty() {
+            row.push(cell);
+        }
         Some(row)
     })
 }
@@ -174,6 +262,26 @@ mod tests {
             (table.rows.len(), table.number(1, 1), table.column("c")),
             (2, 4.0, None)
         );
+        for text in [
+            "# of a simulation\n# a,b\n1.5,2.5\n3.0,4.0\n",
+            "a, b\n1.5, 2.5\n3.0, 4.0\n",
+            "a;b\n1,5;2,5\n3,0;4,0\n",
+            "a\tb\n1.5\t2.5\n3.0\t4.0\n",
+            "# a b\n1.5 2.5\n3.0 4.0\n",
+            "a  b\n 1.5   2.5 \n 3.0   4.0\n",
+            "A,B\r1.5,2.5\r3.0,4.0\r",
+        ] {
+            let table = TextTable::parse(text).expect(text);
+            let (a, b) = (
+                table.column("a").expect(text),
+                table.column("b").expect(text),
+            );
+            let numbers = [0, 1].map(|row| [table.number(row, a), table.number(row, b)]);
+            assert_eq!(numbers, [[1.5, 2.5], [3.0, 4.0]], "{text}");
+            assert_eq!(table.rows.len(), 2, "{text}");
+        }
+        let refused = TextTable::parse("# three, of, these\n1.0,2.0\n").unwrap_err();
+        assert!(refused.contains("first line has 2 numbers"), "{refused}");
         assert!(
             TextTable::parse("a,b\n1\n")
                 .unwrap_err()

@@ -6,6 +6,7 @@
 use crate::Error;
 use crate::io::edges;
 use crate::io::netcdf_input::{NetcdfFile, TIME, X, Y, Z, open};
+use crate::io::{UtcTime, variable};
 use std::path::{Path, PathBuf};
 use wakescope_les::winds::{Edges, VolumeComponent};
 
@@ -22,8 +23,10 @@ pub(crate) struct FieldPlace {
     pub(crate) path: PathBuf,
     /// Its place along the time, if the file has such a dimension.
     pub(crate) place: Option<usize>,
-    /// Its time in s, or in the unit that the file leaves unnamed.
+    /// Its time in s after `reference`, or in the unit that the file leaves unnamed.
     pub(crate) time_s: f64,
+    /// The date from which times of the file count, if it has one.
+    pub(crate) reference: Option<UtcTime>,
 }
 
 /// The fields of a file, in the order of their times.
@@ -32,45 +35,64 @@ pub(crate) struct FieldPlace {
 /// A file that cannot be read or lacks the variable `name`; a time without values.
 pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> {
     let file = open(path)?;
-    let times = times(&file, name).map_err(|reason| file.refuse(reason))?;
+    let (times, reference) = times(&file, name).map_err(|reason| file.refuse(reason))?;
     Ok(times
         .into_iter()
         .map(|(place, time_s)| FieldPlace {
             path: path.to_owned(),
             place,
             time_s,
+            reference,
         })
         .collect())
 }
 
-fn times(file: &NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, String> {
+/// The place of each field along the time, and its time; and the date from which these count.
+type FieldTimes = (Vec<(Option<usize>, f64)>, Option<UtcTime>);
+
+fn times(file: &NetcdfFile, name: &str) -> Result<FieldTimes, String> {
+    let date = |variable: &str| variable::reference(file, variable).map(|(date, _)| date);
     let Some(dim) = file.dim_of(name, TIME) else {
         // A field on its own: its time is a number beside it.
-        let time = if file.has("time") {
-            file.seconds("time")?.first().copied()
-        } else {
-            None
+        let (time, reference) = match file.has("time") {
+            true => (file.seconds("time")?.first().copied(), date("time")),
+            false => (None, None),
         };
-        return Ok(vec![(None, time.unwrap_or(0.0))]);
+        return Ok((vec![(None, time.unwrap_or(0.0))], reference));
     };
     if file.dims(name).and_then(|dims| dims.first().copied()) != Some(dim.as_str()) {
         return Err(format!("{name}: time must be its first dimension"));
     }
-    let source = [dim.as_str(), "XTIME", "time"]
-        .into_iter()
-        .find(|n| file.has(n))
-        .map(str::to_owned);
-    let Some(source) = source else {
-        return Err(
-            "it has no times: a variable of the name of its time dimension is needed".into(),
-        );
+    let source = file.coordinate_name(&dim);
+    let source = source.or_else(|| file.has("time").then_some("time"));
+    let (times_s, reference) = match source {
+        Some(source) => (file.seconds(source)?, date(source)),
+        None => wrf_times(file)?,
     };
-    Ok(file
-        .seconds(&source)?
-        .into_iter()
-        .enumerate()
-        .map(|(i, t)| (Some(i), t))
-        .collect())
+    let times = times_s.into_iter().enumerate();
+    Ok((
+        times.map(|(i, time_s)| (Some(i), time_s)).collect(),
+        reference,
+    ))
+}
+
+/// Times of WRF where they are texts alone: in s after the start of the run, or else after the first of them.
+fn wrf_times(file: &NetcdfFile) -> Result<(Vec<f64>, Option<UtcTime>), String> {
+    let texts = file.texts("Times").map_err(|_| {
+        "it has no times: a variable of the name of its time dimension is needed".to_owned()
+    })?;
+    let dates: Option<Vec<UtcTime>> = texts
+        .iter()
+        .map(|text| Some(UtcTime::parse_reference(text)?.0))
+        .collect();
+    let dates =
+        dates.ok_or("a text of its variable Times is no date such as 2024-01-31_12:00:00")?;
+    let stated = ["SIMULATION_START_DATE", "START_DATE"]
+        .iter()
+        .find_map(|name| UtcTime::parse_reference(file.global_text(name)?));
+    let start = stated.map(|(date, _)| date).or(dates.first().copied());
+    let after = |date: &UtcTime| start.map_or(0.0, |start| date.seconds_since(start));
+    Ok((dates.iter().map(after).collect(), start))
 }
 
 /// The components of one field, in m and m/s or the units that the file leaves unnamed, on the axes of the file.
@@ -155,7 +177,7 @@ fn component(
 
 /// Places of the nodes along a dimension: its coordinate, or what WRF has instead.
 fn nodes(file: &NetcdfFile, dim: &str, place: Option<usize>) -> Result<Vec<f64>, String> {
-    if file.has(dim) {
+    if file.coordinate_name(dim).is_some() {
         return file.coordinate_m(dim);
     }
     let staggered = dim.ends_with("_stag");
@@ -291,5 +313,69 @@ mod tests {
         }
         // What the air carries keeps its own unit, which the scene scales.
         assert_eq!(read_scalar(&place, "beta").unwrap().values, vec![2.0; 64]);
+    }
+
+    /// Writes a file of one field of components that are 1 more at each node, upwards, than at the one below.
+    fn staggered(path: &Path, names: [[&'static str; 3]; 3], time: Variable) {
+        let mut dims = vec![("time", 1)];
+        let mut variables = vec![time];
+        for name in names.concat() {
+            if !dims.contains(&(name, 4)) {
+                dims.push((name, 4));
+                let own: &'static [&'static str] = vec![name].leak();
+                variables.push(Variable::new(name, own, Data::f64([0.0, 1.0, 2.0, 3.0])));
+            }
+        }
+        for (component, [x, y, z]) in ["u", "v", "w"].into_iter().zip(names) {
+            let values = Data::f64((0..64).map(|i| f64::from(i / 16)));
+            let own: &'static [&'static str] = vec!["time", z, y, x].leak();
+            variables.push(Variable::new(component, own, values));
+        }
+        let layout = Layout {
+            dims,
+            globals: Vec::new(),
+            variables,
+        };
+        let origin = crate::io::provenance::example();
+        std::fs::write(path, layout.into_bytes(&origin).unwrap()).unwrap();
+    }
+
+    #[test]
+    fn axes_are_known_by_the_names_of_large_eddy_simulations() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("les.nc");
+        for names in [
+            [["xh", "y", "z"], ["x", "yh", "z"], ["x", "y", "zh"]],
+            [["xm", "yt", "zt"], ["xt", "ym", "zt"], ["xt", "yt", "zm"]],
+            [["xf", "yh", "zh"], ["xh", "yf", "zh"], ["xh", "yh", "zf"]],
+        ] {
+            let time = Variable::new("time", &["time"], Data::f64([10.0]));
+            staggered(&path, names, time.text("units", "seconds since start"));
+            let place = places(&path, "u").unwrap().remove(0);
+            assert_eq!((place.time_s, place.reference), (10.0, None));
+            for component in read(&place, &["u", "v", "w"].map(str::to_owned)).unwrap().0 {
+                assert!(component.nodes_m.iter().all(|nodes| nodes[3] == 3.0));
+                assert_eq!(component.values[63], 3.0, "{names:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_file_tells_the_date_from_which_its_times_count() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("dated.nc");
+        let names = [["x", "y", "z"]; 3];
+        let time = Variable::new("time", &["time"], Data::f64([0.5]));
+        staggered(
+            &path,
+            names,
+            time.text("units", "minutes since 2024-1-31 13:00 +01:00"),
+        );
+        let place = places(&path, "u").unwrap().remove(0);
+        let date = place.reference.map(|date| date.to_string());
+        assert_eq!(
+            (place.time_s, date.as_deref()),
+            (30.0, Some("2024-01-31T12:00:00Z"))
+        );
     }
 }

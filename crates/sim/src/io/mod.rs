@@ -31,6 +31,7 @@ pub(crate) mod netcdf_input;
 pub(crate) mod planes_input;
 pub(crate) mod text_file;
 pub(crate) mod units;
+pub(crate) mod variable;
 
 pub mod cf_fields;
 pub mod cf_planes;

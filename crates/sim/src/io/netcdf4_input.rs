@@ -1,8 +1,9 @@
-//! What NetCDF-4 (HDF5) must not be before the library follows it: groups in circles and without end.
+//! What NetCDF-4 (HDF5) must not be before the library follows it: groups in circles and without end; and what the library passes over.
 //!
 //! Check: groups in circles and values that no file of that length holds are refused; a field that another program compressed in chunks
 //! gives the wind that it was sampled from.
 
+use super::netcdf_input::{PACKING, Packing};
 use hdf5_reader::Hdf5File;
 use std::path::Path;
 
@@ -10,29 +11,45 @@ use std::path::Path;
 const DEEPEST: usize = 32;
 const MOST_GROUPS: usize = 10_000;
 
-/// Refuses a file whose groups hold each other, or are nested too deep: the library would follow them until its stack ends; a damaged one in
-/// the words given.
+/// Refuses a file whose groups hold each other, or are nested too deep: the library would follow them until its stack ends; a damaged
+/// one in the words given. Returns the attributes that say how the numbers of its variables are packed, as far as they are there: the
+/// library passes over those of types that it does not know.
 ///
 /// # Errors
 /// What is wrong with it; a damaged file.
-pub(super) fn check_groups(path: &Path, unsound: &'static str) -> Result<(), &'static str> {
+pub(super) fn check_groups(path: &Path, unsound: &'static str) -> Result<Packing, &'static str> {
     let damaged = |_: hdf5_reader::error::Error| unsound;
-    let mut groups = vec![
-        Hdf5File::open(path)
-            .and_then(|file| file.root_group())
-            .map_err(damaged)?,
-    ];
+    let mut packing = Packing::new();
+    let root = Hdf5File::open(path).and_then(|file| file.root_group());
+    let mut groups = vec![(String::new(), root.map_err(damaged)?)];
     for _ in 0..=DEEPEST {
-        let below: Result<Vec<_>, _> = groups.iter().map(|group| group.groups()).collect();
-        groups = below.map_err(damaged)?.into_iter().flatten().collect();
+        let mut below = Vec::new();
+        for (path, group) in &groups {
+            let (children, datasets) = group.members().map_err(damaged)?;
+            for dataset in datasets {
+                let mut names: Vec<String> =
+                    dataset.attributes().into_iter().map(|a| a.name).collect();
+                names.retain(|name| PACKING.contains(&name.as_str()));
+                packing.insert(format!("{path}{}", leaf(dataset.name())), names);
+            }
+            for child in children {
+                below.push((format!("{path}{}/", leaf(child.name())), child));
+            }
+        }
+        groups = below;
         if groups.is_empty() {
-            return Ok(());
+            return Ok(packing);
         }
         if groups.len() > MOST_GROUPS {
             break;
         }
     }
     Err("its groups hold each other, or are nested more than 32 deep")
+}
+
+/// The last name of a path.
+fn leaf(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or(path)
 }
 
 /// Small files for tests, made byte by byte.

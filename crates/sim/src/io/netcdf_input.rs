@@ -1,18 +1,23 @@
 //! Reading NetCDF files, classic ones and with the feature `netcdf4` those in HDF5: variables as `f64`, with their dimensions in a
 //! wanted order.
 //!
-//! Dimensions are found by what they are for: by the attribute `axis` of their coordinate, or by their name. Values are
-//! unpacked (`scale_factor`, `add_offset`), missing ones are NaN. Nothing of a file is repeated in a message but names that may be
-//! shown. Check: the readers of initial fields and of cross-planes read back what the writers wrote; files of another hand, damaged
+//! Dimensions are found by what they are for: by the attribute `axis` of their coordinate, by their name or that of their coordinate.
+//! Values are unpacked (`_Unsigned`, `scale_factor`, `add_offset`), missing ones are NaN; along coordinates that fall they are turned
+//! round. Nothing of a file is repeated in a message but short names and units. Check: the readers of initial fields and of cross-planes read back what the writers wrote; files of another hand, damaged
 //! ones, and each word of a good header replaced by large and negative counts in the tests below.
 
-use crate::io::units::Quantity;
+use crate::io::units::{Quantity, split_date};
 use crate::{Error, io::text_file, machine};
-use ndarray::ArrayD;
+use ndarray::{ArrayD, Axis};
+use netcdf_reader::masked::MaskParams;
+use netcdf_reader::unpack::{SignParams, UnpackParams};
 use netcdf_reader::{
     NcAttrValue, NcAttribute, NcFile, NcFormat, NcGroup, NcSliceInfo, NcSliceInfoElem, NcType,
     NcVariable,
 };
+#[cfg(feature = "netcdf4")]
+use netcdf_reader::{NcMetadataMode, NcOpenOptions};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -30,10 +35,11 @@ const UNSOUND: &str =
     "it is no sound NetCDF file: its header is damaged, or counts more than the file holds";
 const UNSOUND_HDF5: &str = "it is NetCDF-4 (HDF5), but damaged or of a kind that is not read: nccopy -k nc6 in.nc out.nc makes classic \
                             NetCDF of it";
-/// How NetCDF-4 becomes classic, for programs that do not read it.
-#[cfg(not(feature = "netcdf4"))]
-const CONVERT: &str = "it is NetCDF-4 (HDF5), classic NetCDF is needed: nccopy -k nc6 in.nc out.nc, or in xarray \
-                       to_netcdf(\"out.nc\", format=\"NETCDF3_64BIT\")";
+/// How NetCDF-4 becomes classic.
+const CONVERT: &str = "nccopy -k nc6 in.nc out.nc, or in xarray load_dataset(\"in.nc\").to_netcdf(\"out.nc\", format=\"NETCDF3_64BIT\")";
+
+/// What netCDF-4 puts before the name of a variable that is also that of a dimension along which it does not run.
+const NON_COORDINATE: &str = "_nc4_non_coord_";
 
 /// What a dimension is for: its name here, its letter in the attribute `axis`, and other names for it.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +48,13 @@ pub(crate) struct Role {
     axis: &'static str,
     /// Words between blanks.
     others: &'static str,
+}
+
+impl Role {
+    fn is_named(self, name: &str) -> bool {
+        let name = name.to_ascii_lowercase();
+        name == self.name || self.others.split(' ').any(|other| other == name)
+    }
 }
 
 /// Time, or the age of a wake.
@@ -54,19 +67,19 @@ pub(crate) const TIME: Role = Role {
 pub(crate) const X: Role = Role {
     name: "x",
     axis: "X",
-    others: "x_face xc xf xu west_east west_east_stag",
+    others: "x_face xc xf xh xm xt xu ni nip1 west_east west_east_stag",
 };
 /// Across the flight.
 pub(crate) const Y: Role = Role {
     name: "y",
     axis: "Y",
-    others: "y_face yc yf yv lateral south_north south_north_stag",
+    others: "y_face yc yf yh ym yt yv nj njp1 lateral south_north south_north_stag",
 };
 /// Up.
 pub(crate) const Z: Role = Role {
     name: "z",
     axis: "Z",
-    others: "z_face zc zf zw height altitude zu zu_3d zw_3d bottom_top bottom_top_stag",
+    others: "z_face zc zf zh zm zt zw nk nkp1 height altitude zu zu_3d zw_3d bottom_top bottom_top_stag",
 };
 
 /// A NetCDF file, open, or a group of one.
@@ -79,9 +92,16 @@ pub(crate) struct NetcdfFile {
     /// Name of the group; empty for the root.
     group: String,
     variables: Vec<NcVariable>,
+    /// Variables of the root.
+    root: Arc<Vec<NcVariable>>,
     /// Attributes of the root.
     attributes: Vec<NcAttribute>,
+    /// Names of the attributes that say how numbers are packed, by the path of their variable, as HDF5 has them.
+    packing: Arc<Packing>,
 }
+
+/// Names of attributes by the path of their variable.
+pub(super) type Packing = BTreeMap<String, Vec<String>>;
 
 impl std::fmt::Debug for NetcdfFile {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -99,16 +119,20 @@ pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
         reason: reason.to_owned(),
     };
     let (_, bytes, beginning) = text_file::begin(path)?;
-    match &beginning[..] {
-        [b'C', b'D', b'F', 1 | 2 | 5, ..] => {}
+    let packing = match &beginning[..] {
+        [b'C', b'D', b'F', 1 | 2 | 5, ..] => Packing::default(),
         #[cfg(feature = "netcdf4")]
         [0x89, b'H', b'D', b'F', ..] => {
             super::netcdf4_input::check_groups(path, UNSOUND_HDF5).map_err(refuse)?
         }
         #[cfg(not(feature = "netcdf4"))]
-        [0x89, b'H', b'D', b'F', ..] => return Err(refuse(CONVERT)),
+        [0x89, b'H', b'D', b'F', ..] => {
+            return Err(refuse(&format!(
+                "it is NetCDF-4 (HDF5), classic NetCDF is needed: {CONVERT}"
+            )));
+        }
         _ => return Err(refuse(OTHER)),
-    }
+    };
     let unsound = || {
         refuse(if beginning[0] == b'C' {
             UNSOUND
@@ -116,32 +140,55 @@ pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
             UNSOUND_HDF5
         })
     };
-    // By places: a file that is mapped to memory would end the program where it becomes shorter.
+    // By places: a file that is mapped to memory would end the program where it becomes shorter. Variables and attributes of types
+    // that netCDF does not know are passed over, as nothing may need them.
     #[cfg(feature = "netcdf4")]
-    let file = hdf5_reader::FileStorage::open(path)
-        .ok()
-        .and_then(|file| NcFile::from_storage(Arc::new(file)).ok());
+    let file = hdf5_reader::FileStorage::open(path).ok().and_then(|file| {
+        let options = NcOpenOptions {
+            metadata_mode: NcMetadataMode::Lossy,
+            ..NcOpenOptions::default()
+        };
+        NcFile::from_storage_with_options(Arc::new(file), options).ok()
+    });
     #[cfg(not(feature = "netcdf4"))]
     let file = NcFile::open(path).ok();
     let file = file.ok_or_else(unsound)?;
     let root = file.root_group().map_err(|_| unsound())?;
+    // The library holds only records against the length of the file.
+    let end_of = |v: &NcVariable| {
+        v.data_offset.checked_add(
+            v.num_elements()
+                .ok()?
+                .checked_mul(v.dtype.size().ok()? as u64)?,
+        )
+    };
+    let is_cut = |v: &NcVariable| !v.is_record_var && end_of(v).is_none_or(|end| end > bytes);
+    if beginning[0] == b'C' && root.variables.iter().any(is_cut) {
+        return Err(unsound());
+    }
     let (variables, attributes) = (root.variables.clone(), root.attributes.clone());
     Ok(NetcdfFile {
         path: path.to_owned(),
         file: Arc::new(file),
         bytes,
         group: String::new(),
+        root: Arc::new(variables.clone()),
         variables,
         attributes,
+        packing: Arc::new(packing),
     })
 }
 
-/// Opens the root of a file and the groups in it, as far as they have the variable `needed`; attributes of the file are those of its
+/// Opens the root of a file and the groups in it, as far as they have what is `needed`; attributes of the file are those of its
 /// root. A classic file is its root alone.
 ///
 /// # Errors
-/// As [`open`]; a file without that variable.
-pub(crate) fn open_groups(path: &Path, needed: &str) -> Result<Vec<NetcdfFile>, Error> {
+/// As [`open`]; a file without it, with the name of what is needed.
+pub(crate) fn open_groups(
+    path: &Path,
+    needed: &str,
+    has_needed: impl Fn(&NetcdfFile) -> bool,
+) -> Result<Vec<NetcdfFile>, Error> {
     let root = open(path)?;
     let groups = root
         .file
@@ -158,7 +205,7 @@ pub(crate) fn open_groups(path: &Path, needed: &str) -> Result<Vec<NetcdfFile>, 
     let mut found: Vec<NetcdfFile> = std::iter::once(root.clone())
         .chain(groups.iter().map(of_group))
         .collect();
-    found.retain(|group| group.has(needed));
+    found.retain(has_needed);
     if found.is_empty() {
         return Err(root.refuse(format!(
             "neither it nor one of its groups has a variable {needed}"
@@ -182,7 +229,9 @@ impl NetcdfFile {
     }
 
     fn variable(&self, name: &str) -> Option<&NcVariable> {
-        self.variables.iter().find(|variable| variable.name == name)
+        self.variables
+            .iter()
+            .find(|variable| own_name(variable) == name)
     }
 
     /// Whether it has a variable of this name.
@@ -192,7 +241,7 @@ impl NetcdfFile {
 
     /// Names of all variables.
     pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
-        self.variables.iter().map(|variable| variable.name.as_str())
+        self.variables.iter().map(own_name)
     }
 
     /// Lengths of the dimensions of a variable, slowest first.
@@ -238,6 +287,45 @@ impl NetcdfFile {
     /// A number among the attributes of a variable.
     pub(crate) fn number(&self, variable: &str, name: &str) -> Option<f64> {
         self.variable(variable)?.attribute(name)?.value.as_f64()
+    }
+
+    /// Texts of a variable of the group or else of the root, whose last dimension are the characters.
+    ///
+    /// # Errors
+    /// A variable that is not there or not made of texts.
+    pub(crate) fn texts(&self, name: &str) -> Result<Vec<String>, String> {
+        let is_text = |v: &&NcVariable| matches!(v.dtype, NcType::Char | NcType::String);
+        let own = self.variable(name).filter(is_text);
+        let of_root = || {
+            self.root
+                .iter()
+                .find(|v| own_name(v) == name)
+                .filter(is_text)
+        };
+        let path = match (own, of_root()) {
+            (Some(variable), _) => self.path_of(variable),
+            (None, Some(variable)) => variable.name.clone(),
+            (None, None) => return Err(format!("it has no texts {name}")),
+        };
+        let texts = self.file.read_variable_as_strings(&path);
+        let texts = texts.map_err(|_| format!("variable {name} cannot be read"))?;
+        let plain = |text: String| text.trim_matches(['\0', ' ']).to_owned();
+        Ok(texts.into_iter().map(plain).collect())
+    }
+
+    /// A text of the file: a variable of one text in the group or the root, or an attribute of the file.
+    pub(crate) fn named_text(&self, name: &str) -> Option<String> {
+        match self.texts(name).as_deref() {
+            Ok([text]) => Some(text.clone()),
+            _ => self.global_text(name).map(str::to_owned),
+        }
+    }
+
+    fn path_of(&self, variable: &NcVariable) -> String {
+        match self.group.is_empty() {
+            true => variable.name.clone(),
+            false => format!("{}/{}", self.group, variable.name),
+        }
     }
 
     /// A variable as `f64`, whatever its type of number; NaN where a value is missing.
@@ -287,39 +375,105 @@ impl NetcdfFile {
         }
         // As they are in the file, as the library and as this program hands them on.
         machine::holds(&format!("variable {name}"), 32.0 * count)?;
-        let path = if self.group.is_empty() {
-            name.to_owned()
-        } else {
-            format!("{}/{name}", self.group)
+        let path = self.path_of(variable);
+        self.has_known_packing(variable, &path)?;
+        let stored = match ranges {
+            [] => self.file.read_variable_as_f64(&path),
+            _ => self.file.read_variable_slice_as_f64(&path, &part),
         };
-        let values = match ranges {
-            [] => self.file.read_variable_unpacked_masked(&path),
-            _ => self.file.read_variable_slice_unpacked_masked(&path, &part),
-        };
-        let is_hdf5 = matches!(self.file.format(), NcFormat::Nc4 | NcFormat::Nc4Classic);
-        let unsound = if is_hdf5 { UNSOUND_HDF5 } else { UNSOUND };
-        let values = values.map_err(|_| format!("variable {name} cannot be read: {unsound}"))?;
-        // The library knows fills that the file states, not those of values that were never written.
-        let is_unwritten = |value: f64| (value / DEFAULT_FILL - 1.0).abs() < 1e-6;
-        Ok(values
+        let stored = stored.map_err(|error| self.unreadable(name, &error.to_string()))?;
+        Ok(unpacked(variable, stored).into_iter().collect())
+    }
+
+    /// Refuses a variable with an attribute about its packing that is no number, or of a type that is not read.
+    fn has_known_packing(&self, variable: &NcVariable, path: &str) -> Result<(), String> {
+        let shown = presentable(own_name(variable)).unwrap_or("a variable");
+        let stored = self.packing.get(path).into_iter().flatten();
+        if let Some(name) = stored
             .into_iter()
-            .map(|value| if is_unwritten(value) { f64::NAN } else { value })
-            .collect())
+            .find(|name| variable.attribute(name).is_none())
+        {
+            return Err(format!(
+                "attribute {name} of variable {shown} is of a type that is not read"
+            ));
+        }
+        for attribute in &variable.attributes {
+            let (name, value) = (attribute.name.as_str(), &attribute.value);
+            let is_known = match name {
+                "_Unsigned" => text(value).is_none_or(|text| {
+                    text.eq_ignore_ascii_case("true") || text.eq_ignore_ascii_case("false")
+                }),
+                "valid_range" => value.as_f64_vec().is_some_and(|ends| ends.len() == 2),
+                _ => !PACKING.contains(&name) || value.as_f64().is_some(),
+            };
+            if !is_known {
+                let found =
+                    text(value).map_or(String::new(), |text| format!(" = {}", quoted(text)));
+                return Err(format!(
+                    "variable {shown} has the attribute {name}{found}: {}",
+                    match name {
+                        "_Unsigned" => "true or false is needed",
+                        "valid_range" => "two numbers are needed",
+                        _ => "a number is needed",
+                    }
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Why a variable cannot be read, in words that tell nothing of the file but the number of its filter.
+    fn unreadable(&self, name: &str, error: &str) -> String {
+        let is_hdf5 = matches!(self.file.format(), NcFormat::Nc4 | NcFormat::Nc4Classic);
+        let filter = error
+            .split_once("filter id ")
+            .and_then(|(_, rest)| rest.split(|c: char| !c.is_ascii_digit()).next());
+        match filter {
+            Some(number) => {
+                let known = FILTERS.iter().find(|(own, _)| *own == number);
+                let filter = known.map_or("a filter", |(_, filter)| filter);
+                format!(
+                    "variable {name} is compressed by {filter} (number {number} of HDF5), which is not read: {CONVERT} makes classic NetCDF \
+                     of it where that filter is installed"
+                )
+            }
+            None if is_hdf5 => format!("variable {name} cannot be read: {UNSOUND_HDF5}"),
+            None => format!("variable {name} cannot be read: {UNSOUND}"),
+        }
     }
 
     /// The dimension of `variable` that has a role.
     fn find(&self, dims: &[&str], role: Role) -> Option<usize> {
         let of_axis = |dim: &&str| {
-            self.text(dim, "axis")
+            let own = self.coordinate_name(dim);
+            own.and_then(|name| self.text(name, "axis"))
                 .is_some_and(|axis| axis.eq_ignore_ascii_case(role.axis))
         };
-        let of_name = |dim: &&str| {
-            let dim = dim.to_ascii_lowercase();
-            dim == role.name || role.others.split(' ').any(|other| other == dim)
+        let of_coordinate = |dim: &&str| {
+            self.coordinate_name(dim)
+                .is_some_and(|name| role.is_named(name))
         };
         dims.iter()
-            .position(of_name)
+            .position(|dim| role.is_named(dim))
             .or_else(|| dims.iter().position(of_axis))
+            .or_else(|| dims.iter().position(of_coordinate))
+    }
+
+    /// The variable with the positions of a dimension: that of its name, or one along it alone that is called as one or has the
+    /// attribute `axis`.
+    pub(crate) fn coordinate_name(&self, dim: &str) -> Option<&str> {
+        let runs_along =
+            |variable: &&NcVariable| matches!(&variable.dimensions[..], [only] if only.name == dim);
+        let is_called = |variable: &&NcVariable| {
+            let name = own_name(variable);
+            [TIME, X, Y, Z].iter().any(|role| role.is_named(name))
+                || self.text(name, "axis").is_some()
+        };
+        if self.has(dim) {
+            return self.variable(dim).map(own_name);
+        }
+        let mut along = self.variables.iter().filter(runs_along);
+        along.find(is_called).map(own_name)
     }
 
     /// The dimension of a variable that has a role, if there is one.
@@ -388,26 +542,36 @@ impl NetcdfFile {
         all.filter(|own| own.name == dim).map(|own| own.size).next()
     }
 
-    /// The coordinate of a dimension.
+    /// The coordinate of a dimension, from the lowest on where it falls.
     ///
     /// # Errors
     /// There is none, or it has another length.
     pub(crate) fn coordinate(&self, dim: &str) -> Result<Vec<f64>, String> {
         let shown = presentable(dim).unwrap_or("a dimension").to_owned();
-        if !self.has(dim) {
+        let Some(name) = self.coordinate_name(dim) else {
             return Err(format!(
                 "{shown} has no coordinate: a variable of that name with its positions is needed"
             ));
-        }
-        let values = self
-            .floats(dim)
+        };
+        let mut values = self
+            .floats(name)
             .map_err(|_| format!("the coordinate of {shown} cannot be read"))?;
         if self.length(dim) != Some(values.len() as u64) {
             return Err(format!(
                 "the coordinate of {shown} has not the length of its dimension"
             ));
         }
+        if falls(&values) {
+            values.reverse();
+        }
         Ok(values)
+    }
+
+    /// Whether the positions of a dimension fall, so that what runs along it is turned round; times are not.
+    fn is_turned(&self, dim: &str) -> bool {
+        let name = self.coordinate_name(dim).unwrap_or(dim);
+        let is_time = TIME.is_named(dim) || TIME.is_named(name);
+        !is_time && self.floats(name).is_ok_and(|values| falls(&values))
     }
 
     /// SI units in the unit that the attribute `units` of a variable names; 1 where it has none.
@@ -415,12 +579,11 @@ impl NetcdfFile {
     /// # Errors
     /// Another unit, with what is needed.
     pub(crate) fn unit(&self, name: &str, quantity: Quantity) -> Result<f64, String> {
-        let text = self.text(name, "units").unwrap_or_default();
-        let text = text.split(" since ").next().unwrap_or_default();
+        let units = self.text(name, "units").unwrap_or_default();
+        let (text, _) = split_date(units);
         let shown = presentable(name).unwrap_or("a variable");
-        quantity
-            .si(text)
-            .map_err(|needed| format!("the attribute units of {shown} is of no use: {needed}"))
+        let refused = |needed| format!("{shown} has units = {}: {needed}", quoted(units));
+        quantity.si(text).map_err(refused)
     }
 
     /// The coordinate of a dimension in metres.
@@ -428,7 +591,8 @@ impl NetcdfFile {
     /// # Errors
     /// As [`Self::coordinate`]; a unit that is no length.
     pub(crate) fn coordinate_m(&self, dim: &str) -> Result<Vec<f64>, String> {
-        let unit_m = self.unit(dim, Quantity::Length)?;
+        let name = self.coordinate_name(dim).unwrap_or(dim);
+        let unit_m = self.unit(name, Quantity::Length)?;
         Ok(self
             .coordinate(dim)?
             .into_iter()
@@ -495,7 +659,10 @@ impl NetcdfFile {
             )?,
             None => self.floats(name)?,
         };
-        if dims == order {
+        let turned: Vec<usize> = (0..dims.len())
+            .filter(|at| self.is_turned(dims[*at]))
+            .collect();
+        if dims == order && turned.is_empty() {
             return Ok(values);
         }
         let lengths: Vec<usize> = dims
@@ -507,9 +674,117 @@ impl NetcdfFile {
             (0..dims.len()).partition(|at| order.iter().any(|own| own == dims[*at]));
         axes.sort_by_key(|at| order.iter().position(|own| own == dims[*at]));
         axes.extend(spare);
-        let stored = ArrayD::from_shape_vec(lengths, values)
+        let mut stored = ArrayD::from_shape_vec(lengths, values)
             .map_err(|_| format!("{name} has not the lengths of its dimensions"))?;
+        for at in turned {
+            stored.invert_axis(Axis(at));
+        }
         Ok(stored.permuted_axes(axes).iter().copied().collect())
+    }
+}
+
+/// Attributes that say which numbers stand for which values, and which for none.
+pub(super) const PACKING: [&str; 8] = [
+    "_FillValue",
+    "_Unsigned",
+    "add_offset",
+    "missing_value",
+    "scale_factor",
+    "valid_max",
+    "valid_min",
+    "valid_range",
+];
+
+/// Filters of HDF5 that files of instruments have, by their registered numbers.
+const FILTERS: [(&str, &str); 8] = [
+    ("307", "bzip2"),
+    ("32000", "LZF"),
+    ("32001", "Blosc"),
+    ("32004", "LZ4"),
+    ("32008", "bitshuffle"),
+    ("32013", "ZFP"),
+    ("32015", "Zstandard"),
+    ("32026", "Blosc2"),
+];
+
+/// The values that the stored numbers of a variable stand for; NaN for those that are missing.
+fn unpacked(variable: &NcVariable, mut values: ArrayD<f64>) -> ArrayD<f64> {
+    let sign = SignParams::from_variable(variable);
+    let packing = UnpackParams::from_variable(variable);
+    // Limits in the type of the packed numbers are about these, others about what they stand for (NetCDF User's Guide, A.1).
+    let is_packed = packing.is_some() && !is_float(&variable.dtype);
+    let is_of_values = |attribute: &NcAttribute| {
+        let is_float = matches!(
+            attribute.value,
+            NcAttrValue::Floats(_) | NcAttrValue::Doubles(_)
+        );
+        is_packed && is_float && attribute.name.starts_with("valid_")
+    };
+    let (of_values, of_stored) = variable.attributes.iter().cloned().partition(is_of_values);
+    let with = |attributes| NcVariable {
+        attributes,
+        ..variable.clone()
+    };
+    let mask = MaskParams::from_variable(&with(of_stored));
+    let is_filled = mask
+        .as_ref()
+        .is_some_and(|mask| mask.fill_value.is_some() || !mask.missing_values.is_empty());
+    let unwritten = unwritten(&variable.dtype).filter(|_| sign.is_none() && !is_filled);
+    if let Some(unwritten) = unwritten {
+        values.mapv_inplace(|value| if value == unwritten { f64::NAN } else { value });
+    }
+    if is_float(&variable.dtype) {
+        let is_unwritten = |value: f64| (value / DEFAULT_FILL - 1.0).abs() < 1e-6;
+        values.mapv_inplace(|value| if is_unwritten(value) { f64::NAN } else { value });
+    }
+    if let Some(sign) = sign {
+        sign.apply(&mut values);
+    }
+    if let Some(mask) = mask {
+        mask.apply(&mut values);
+    }
+    if let Some(packing) = packing {
+        packing.apply(&mut values);
+    }
+    if let Some(limits) = MaskParams::from_variable(&with(of_values)) {
+        limits.apply(&mut values);
+    }
+    values
+}
+
+fn is_float(kind: &NcType) -> bool {
+    matches!(kind, NcType::Float | NcType::Double)
+}
+
+/// What the library of NetCDF stores where no whole number was written; of bytes and of 16 bits without sign each may be a number.
+fn unwritten(kind: &NcType) -> Option<f64> {
+    match kind {
+        NcType::Short => Some(-32_767.0),
+        NcType::Int => Some(-2_147_483_647.0),
+        NcType::UInt => Some(4_294_967_295.0),
+        NcType::Int64 => Some(-9_223_372_036_854_775_806_f64),
+        NcType::UInt64 => Some(18_446_744_073_709_551_614_f64),
+        _ => None,
+    }
+}
+
+/// Whether numbers fall from each to the next.
+fn falls(values: &[f64]) -> bool {
+    values.len() > 1 && values.windows(2).all(|pair| pair[1] < pair[0])
+}
+
+/// The name of a variable as its writer has it.
+fn own_name(variable: &NcVariable) -> &str {
+    let name = variable.name.as_str();
+    name.strip_prefix(NON_COORDINATE).unwrap_or(name)
+}
+
+/// A short text of a file as it may be shown.
+pub(crate) fn quoted(text: &str) -> String {
+    let plain = text.bytes().all(|b| b.is_ascii_graphic() || b == b' ');
+    match plain && text.len() <= 64 {
+        true => format!("\"{text}\""),
+        false => "a text of other signs, or a long one".to_owned(),
     }
 }
 

@@ -48,6 +48,14 @@ impl NumberType {
         self.kind == 'f'
     }
 
+    /// The code that stands for zero: the middle one of a converter that counts without sign, of which none has 64 bits.
+    pub(crate) fn zero(self) -> f64 {
+        match self.kind {
+            'u' if self.bytes <= 4 => middle_code(8 * self.bytes as i32),
+            _ => 0.0,
+        }
+    }
+
     /// A number from its bytes in this order.
     pub(crate) fn value(self, bytes: &[u8], order: ByteOrder) -> f64 {
         let join = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
@@ -64,6 +72,11 @@ impl NumberType {
             _ => f64::from_bits(bits),
         }
     }
+}
+
+/// The middle one of all codes of so many bits without sign.
+pub fn middle_code(bits: i32) -> f64 {
+    2f64.powi(bits - 1)
 }
 
 /// Which byte of a number comes first.
@@ -98,6 +111,8 @@ mod tests {
             assert_eq!(number.value(&little, ByteOrder::Little), value);
             assert_eq!(big.len() as u64, number.bytes);
         }
+        let zeros = ["u8", "u16", "i16", "f32", "u64"].map(|name| named(name).zero());
+        assert_eq!(zeros, [128.0, 32_768.0, 0.0, 0.0, 0.0]);
         assert_eq!(NumberType::of_numpy("i2"), NumberType::named("i16"));
         assert_eq!(
             (NumberType::of_numpy("i8"), named("i8").bytes),

@@ -280,9 +280,9 @@ mod tests {
             );
         }
         for (units, name) in [
-            (["furlongs", "m", "s"], "units of v"),
-            (["m", "m", "s"], "units of v"),
-            (["m/s", "degrees", "s"], "units of z"),
+            (["furlongs", "m", "s"], "v has units"),
+            (["m", "m", "s"], "v has units"),
+            (["m/s", "degrees", "s"], "z has units"),
         ] {
             let message = with_units(units, [1.0; 3]).unwrap_err().to_string();
             assert!(message.contains(name), "{message}");

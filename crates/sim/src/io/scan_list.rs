@@ -85,14 +85,14 @@ fn step_stare(line: &str) -> Option<[f64; 2]> {
 }
 
 fn table(table: &TextTable) -> Result<Vec<Stop>, String> {
-    if let Some(other) = table
-        .header
-        .iter()
-        .find(|name| !COLUMNS.split(", ").any(|known| known == name.trim()))
-    {
+    if let Some(other) = table.header.iter().find(|name| {
+        !COLUMNS
+            .split(", ")
+            .any(|known| known.eq_ignore_ascii_case(name))
+    }) {
         return Err(format!("column {other:?} is not known: {COLUMNS} are"));
     }
-    let column = |name: &str| table.header.iter().position(|h| h.trim() == name);
+    let column = |name: &str| table.column(name);
     let angle = |name: &str| match (
         column(&format!("{name}_rad")),
         column(&format!("{name}_deg")),

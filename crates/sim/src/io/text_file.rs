@@ -37,13 +37,58 @@ pub(crate) fn begin(path: &Path) -> std::result::Result<(File, u64, Vec<u8>), cr
         Read::by_ref(&mut file).take(8).read_to_end(&mut first)?;
         Ok((file, length, first))
     });
-    opened.map_err(crate::Error::io("read", path))
+    let opened = opened.map_err(crate::Error::io("read", path))?;
+    match compression(&opened.2) {
+        Some((name, program)) => Err(crate::Error::Input {
+            path: path.to_owned(),
+            reason: format!("it is compressed with {name}: {program} makes the file that is read"),
+        }),
+        None => Ok(opened),
+    }
+}
+
+/// The compression that a file begins with, and what undoes it.
+fn compression(beginning: &[u8]) -> Option<(&'static str, &'static str)> {
+    match beginning {
+        [0x1F, 0x8B, ..] => Some(("gzip", "gunzip")),
+        [b'B', b'Z', b'h', ..] => Some(("bzip2", "bunzip2")),
+        [0xFD, b'7', b'z', b'X', b'Z', ..] => Some(("xz", "unxz")),
+        [0x28, 0xB5, 0x2F, 0xFD, ..] => Some(("zstd", "unzstd")),
+        _ => None,
+    }
+}
+
+/// The characters of a text in UTF-8 or, behind its mark, UTF-16.
+///
+/// # Errors
+/// The first byte that is none of a text in UTF-8, from 0.
+pub(crate) fn decode(bytes: &[u8]) -> std::result::Result<String, usize> {
+    let text = match bytes {
+        [0xFF, 0xFE, rest @ ..] => utf16(rest, u16::from_le_bytes),
+        [0xFE, 0xFF, rest @ ..] => utf16(rest, u16::from_be_bytes),
+        _ => match std::str::from_utf8(bytes) {
+            Ok(text) => text.to_owned(),
+            Err(e) => return Err(e.valid_up_to()),
+        },
+    };
+    Ok(match text.strip_prefix('\u{feff}') {
+        Some(behind_mark) => behind_mark.to_owned(),
+        None => text,
+    })
+}
+
+fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
+    let units: Vec<u16> = bytes
+        .chunks_exact(2)
+        .map(|pair| unit([pair[0], pair[1]]))
+        .collect();
+    String::from_utf16_lossy(&units)
 }
 
 /// The text of a scene or case file.
 ///
 /// # Errors
-/// As [`open`]; more than 16 MiB; bytes that are no UTF-8.
+/// As [`open`]; more than 16 MiB; a compressed file; bytes that are no text in UTF-8 or UTF-16.
 pub(crate) fn read(path: &Path) -> Result<String> {
     let (file, _) = open(path)?;
     let mut bytes = Vec::new();
@@ -56,8 +101,11 @@ pub(crate) fn read(path: &Path) -> Result<String> {
         );
         return Err(Error::new(ErrorKind::FileTooLarge, reason));
     }
-    String::from_utf8(bytes).map_err(|e| {
-        let at = e.utf8_error().valid_up_to();
+    if let Some((name, program)) = compression(&bytes) {
+        let reason = format!("it is compressed with {name}: {program} makes the file that is read");
+        return Err(Error::new(ErrorKind::InvalidData, reason));
+    }
+    decode(&bytes).map_err(|at| {
         Error::new(
             ErrorKind::InvalidData,
             format!("it is no text in UTF-8: byte {} is not", at + 1),
@@ -77,6 +125,8 @@ mod tests {
         assert_eq!(read(&path).unwrap(), "seed = 1\n");
         std::fs::write(&path, b"seed = \xff\n").unwrap();
         assert!(read(&path).unwrap_err().to_string().contains("byte 8"));
+        std::fs::write(&path, b"\x1f\x8b\x08\0").unwrap();
+        assert!(read(&path).unwrap_err().to_string().contains("gunzip"));
         File::create(&path)
             .unwrap()
             .set_len(LARGEST_BYTES + 1)
@@ -95,5 +145,21 @@ mod tests {
                 .to_string()
                 .contains("device")
         );
+    }
+
+    #[test]
+    fn texts_of_other_systems_have_the_same_characters() {
+        let text = "range_m,elevation_deg\n1.0,2.0\n";
+        let little = text.encode_utf16().flat_map(u16::to_le_bytes);
+        let big = text.encode_utf16().flat_map(u16::to_be_bytes);
+        for bytes in [
+            text.as_bytes().to_vec(),
+            format!("\u{feff}{text}").into_bytes(),
+            [0xFF, 0xFE].into_iter().chain(little).collect(),
+            [0xFE, 0xFF].into_iter().chain(big).collect(),
+        ] {
+            assert_eq!(decode(&bytes).as_deref(), Ok(text));
+        }
+        assert_eq!(decode(b"ab\xff"), Err(2));
     }
 }

@@ -1,30 +1,33 @@
-//! Units of lengths, times and velocities as files write them: udunits words, `km`, `cm s-1`, `m/s`, `km per hour`.
+//! Units of lengths, times, velocities and angles as files write them: udunits words, `km`, `cm s-1`, `m/s`, `km per hour`, `degrees`.
 //!
 //! Check: common spellings, and words that are no such unit.
 
-/// What is measured: powers of length and time.
+/// What is measured: powers of length, time and angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Quantity {
     Length,
     Time,
     Velocity,
+    Angle,
 }
 
 impl Quantity {
-    fn powers(self) -> [i32; 2] {
+    fn powers(self) -> [i32; 3] {
         match self {
-            Self::Length => [1, 0],
-            Self::Time => [0, 1],
-            Self::Velocity => [1, -1],
+            Self::Length => [1, 0, 0],
+            Self::Time => [0, 1, 0],
+            Self::Velocity => [1, -1, 0],
+            Self::Angle => [0, 0, 1],
         }
     }
 
-    /// SI units in `text`, which names a unit of this quantity; 1 where it is empty.
+    /// SI units in `text`, which names a unit of this quantity; where it is empty 1, or a degree.
     ///
     /// # Errors
     /// What is allowed.
     pub(crate) fn si(self, text: &str) -> Result<f64, String> {
         let factor = match text.trim() {
+            "" if self == Self::Angle => Some(1f64.to_radians()),
             "" => Some(1.0),
             // Not "per millisecond".
             "ms-1" | "ms^-1" if self == Self::Velocity => Some(1.0),
@@ -39,26 +42,46 @@ impl Quantity {
                 Self::Velocity => {
                     "a unit of velocity is needed, such as m s-1, cm s-1, km/h or knots"
                 }
+                Self::Angle => "a unit of angle is needed: degrees or radians",
             }
             .to_owned()
         })
     }
 }
 
-/// The factor of a product of units in SI, and its powers of length and time.
-fn product(text: &str) -> Option<(f64, [i32; 2])> {
+/// The unit of times and the text of the date from which they count: `days since 2024-01-31`.
+pub(crate) fn split_date(units: &str) -> (&str, Option<&str>) {
+    let lower = units.to_ascii_lowercase();
+    let word = [" since ", " after ", " from ", " @ "]
+        .into_iter()
+        .find_map(|word| Some((lower.find(word)?, word.len())));
+    match word {
+        Some((at, length)) => (units[..at].trim(), Some(units[at + length..].trim())),
+        None => (units.trim(), None),
+    }
+}
+
+/// The factor of a product of units in SI, and its powers of length, time and angle.
+fn product(text: &str) -> Option<(f64, [i32; 3])> {
+    // The direction in which an angle is counted.
+    let text = text
+        .trim_end_matches("_north")
+        .trim_end_matches("_east")
+        .trim_end_matches("_clockwise_from_north");
     let spaced = text
         .replace("**", "^")
+        .replace('⁻', "-")
+        .replace('¹', "1")
         .replace('/', " / ")
-        .replace(['.', '*', '_'], " ");
-    let (mut factor, mut powers, mut sign) = (1.0_f64, [0; 2], 1);
+        .replace(['.', '*', '_', '·'], " ");
+    let (mut factor, mut powers, mut sign) = (1.0_f64, [0; 3], 1);
     for word in spaced.split_whitespace() {
         if word == "/" || word == "per" {
             sign = -1;
             continue;
         }
         let end = word
-            .find(|c: char| !c.is_alphabetic())
+            .find(|c: char| !(c.is_alphabetic() || c == '°'))
             .unwrap_or(word.len());
         let power = match word[end..].trim_start_matches('^') {
             "" => 1,
@@ -67,30 +90,28 @@ fn product(text: &str) -> Option<(f64, [i32; 2])> {
         let (unit, own) = base(&word[..end])?;
         let power = sign * power;
         factor *= unit.powi(power);
-        powers = [powers[0] + power * own[0], powers[1] + power * own[1]];
+        for (sum, own) in powers.iter_mut().zip(own) {
+            *sum += power * own;
+        }
         // A line divides by the unit behind it.
         sign = 1;
     }
     Some((factor, powers))
 }
 
-/// Units in SI, with their powers of length and time.
+/// Units in SI, with their powers of length, time and angle.
 const UNITS: &str = include_str!("units.csv");
 
 /// One unit in SI, and its powers.
-fn base(word: &str) -> Option<(f64, [i32; 2])> {
+fn base(word: &str) -> Option<(f64, [i32; 3])> {
     let lower = word.to_lowercase();
     let row = UNITS
         .lines()
         .find_map(|row| row.split_once(',').filter(|(unit, _)| *unit == lower))?
         .1;
-    let (factor, (length, time)) = row
-        .split_once(',')
-        .and_then(|(factor, powers)| Some((factor, powers.split_once(',')?)))?;
-    Some((
-        factor.parse().ok()?,
-        [length.parse().ok()?, time.parse().ok()?],
-    ))
+    let (factor, powers) = row.split_once(',')?;
+    let powers: Option<Vec<i32>> = powers.split(',').map(|power| power.parse().ok()).collect();
+    Some((factor.parse().ok()?, powers?.try_into().ok()?))
 }
 
 #[cfg(test)]
@@ -114,6 +135,7 @@ mod tests {
             "",
             "m_s-1",
             "ms-1",
+            "m s⁻¹",
         ] {
             close(Quantity::Velocity, text, 1.0);
         }
@@ -146,6 +168,16 @@ mod tests {
         ] {
             close(Quantity::Time, text, expected);
         }
+        for (text, expected) in [
+            ("rad", 1.0),
+            ("degrees", 1f64.to_radians()),
+            ("degree_north", 1f64.to_radians()),
+            ("deg", 1f64.to_radians()),
+            ("°", 1f64.to_radians()),
+            ("", 1f64.to_radians()),
+        ] {
+            close(Quantity::Angle, text, expected);
+        }
         for (quantity, text) in [
             (Quantity::Velocity, "m"),
             (Quantity::Velocity, "m s-2"),
@@ -155,6 +187,9 @@ mod tests {
             (Quantity::Length, "1"),
             (Quantity::Time, "months"),
             (Quantity::Time, "1e3 s"),
+            (Quantity::Angle, "m"),
+            (Quantity::Angle, "1"),
+            (Quantity::Velocity, "deg s-1"),
         ] {
             assert!(quantity.si(text).is_err(), "{text}");
         }

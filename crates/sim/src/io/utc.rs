@@ -34,6 +34,35 @@ impl UtcTime {
         (time.to_string() == text && (1900..2200).contains(&time.date().year())).then_some(time)
     }
 
+    /// Reads a date as files write it, from which times count: `2024-01-31 12:00:0.5 +02:00`, `2024-1-31`, `20240131T120000Z`,
+    /// `2024-01-31_12:00:00`, without a zone for UTC. Returns the second, and the fraction of a second beyond it; `None` for any
+    /// other text.
+    ///
+    /// ```
+    /// use wakescope_sim::io::UtcTime;
+    /// let (date, fraction_s) = UtcTime::parse_reference("2024-01-31 14:01:0.5 +0200").expect("a date");
+    /// assert_eq!((date.to_string().as_str(), fraction_s), ("2024-01-31T12:01:00Z", 0.5));
+    /// assert_eq!(UtcTime::parse_reference("the start"), None);
+    /// ```
+    pub fn parse_reference(text: &str) -> Option<(Self, f64)> {
+        let text = text.trim();
+        let end = text
+            .find(|c: char| c == 'T' || c == '_' || c.is_whitespace())
+            .unwrap_or(text.len());
+        let date = calendar_date(&text[..end])?;
+        let rest = text[end..].trim_start_matches(['T', '_']).trim();
+        let end = rest
+            .find(|c: char| !(c.is_ascii_digit() || c == ':' || c == '.'))
+            .unwrap_or(rest.len());
+        let second_of_day = second_of_day(&rest[..end])?;
+        let east_s = zone_s(rest[end..].trim())?;
+        let midnight = Offset::UTC.to_timestamp(date.to_datetime(jiff::civil::Time::midnight()));
+        let second = second_of_day.floor();
+        let after = SignedDuration::from_secs(second as i64 - east_s);
+        let time = midnight.ok()?.checked_add(after).ok()?;
+        Some((Self(time), second_of_day - second))
+    }
+
     /// Seconds from an earlier date to this one.
     pub fn seconds_since(self, earlier: Self) -> f64 {
         (self.0.as_second() - earlier.0.as_second()) as f64
@@ -58,6 +87,72 @@ impl UtcTime {
     pub fn second_of_day(self) -> i64 {
         self.0.as_second().rem_euclid(DAY_S as i64)
     }
+}
+
+/// Year, month and day of `2024-1-31` or `20240131`.
+fn calendar_date(text: &str) -> Option<jiff::civil::Date> {
+    let numbers: Vec<&str> = match text.as_bytes() {
+        [b'0'..=b'9', ..] if text.len() == 8 && text.bytes().all(|b| b.is_ascii_digit()) => {
+            vec![&text[..4], &text[4..6], &text[6..]]
+        }
+        _ => text.split(['-', '/']).collect(),
+    };
+    let [year, month, day] = numbers[..] else {
+        return None;
+    };
+    jiff::civil::Date::new(whole(year)?, whole(month)?, whole(day)?).ok()
+}
+
+/// A whole number of at most four digits, without a sign.
+fn whole<T: std::str::FromStr>(text: &str) -> Option<T> {
+    let are_digits = text.bytes().all(|b| b.is_ascii_digit());
+    text.parse().ok().filter(|_| are_digits && text.len() <= 4)
+}
+
+/// Seconds since midnight of `12:01:0.5`, `12:01`, `120100` or nothing.
+fn second_of_day(text: &str) -> Option<f64> {
+    let (clock, fraction) = text.split_once('.').unwrap_or((text, ""));
+    let numbers: Vec<&str> = match clock.len() {
+        0 => Vec::new(),
+        6 if !clock.contains(':') => vec![&clock[..2], &clock[2..4], &clock[4..]],
+        4 if !clock.contains(':') => vec![&clock[..2], &clock[2..]],
+        _ => clock.split(':').collect(),
+    };
+    if numbers.len() > 3 || (!fraction.is_empty() && numbers.len() != 3) {
+        return None;
+    }
+    let mut second = 0;
+    for (place, number) in numbers.iter().enumerate() {
+        let most = [23, 59, 60][place];
+        let value: i32 = whole(number).filter(|value| *value <= most)?;
+        second += value * [3600, 60, 1][place];
+    }
+    let fraction: f64 = format!("0.{fraction}0").parse().ok()?;
+    Some(f64::from(second) + fraction)
+}
+
+/// Seconds by which the clocks of a zone are ahead of UTC: `Z`, `UTC`, `+02:00`, `-0530`, `+2`, `0:00` or nothing.
+fn zone_s(text: &str) -> Option<i64> {
+    let upper = text.to_ascii_uppercase();
+    let text = ["UTC", "GMT", "Z"]
+        .iter()
+        .find_map(|name| upper.strip_prefix(name))
+        .unwrap_or(&upper)
+        .trim();
+    let (sign, clock) = match text.as_bytes() {
+        [] => return Some(0),
+        [b'+', ..] => (1, &text[1..]),
+        [b'-', ..] => (-1, &text[1..]),
+        _ => (1, text),
+    };
+    let (hours, minutes) = match (clock.split_once(':'), clock.len()) {
+        (Some(both), _) => both,
+        (None, 3 | 4) => clock.split_at_checked(clock.len() - 2)?,
+        (None, _) => (clock, "0"),
+    };
+    let hours: i64 = whole(hours).filter(|hours| *hours <= 18)?;
+    let minutes: i64 = whole(minutes).filter(|minutes| *minutes <= 59)?;
+    Some(sign * (3600 * hours + 60 * minutes))
 }
 
 impl std::fmt::Display for UtcTime {
@@ -102,6 +197,58 @@ mod tests {
             (day, count) = (next, count + 1);
         }
         assert_eq!(count, 300 * 365 + 73, "73 leap years from 1900 to 2199");
+    }
+
+    #[test]
+    fn dates_of_files_are_read_in_all_their_spellings() {
+        for text in [
+            "2024-01-31T12:01:00Z",
+            "2024-01-31 12:01:00",
+            "2024-1-31 12:1:0.0",
+            "2024-01-31 12:01",
+            "2024-01-31T14:01:00+02:00",
+            "2024-01-31 14:01:00 +0200",
+            "2024-01-31 14:01:00 +2",
+            "2024-01-31 06:31:00 -05:30",
+            "2024-01-31 12:01:00 UTC",
+            "2024-01-31 12:01:00 utc",
+            "2024-01-31 12:01:00 0:00",
+            "20240131T120100Z",
+            "2024-01-31_12:01:00",
+            "2024/01/31 12:01:00.000 GMT",
+            " 2024-02-01 00:01:00 +12:00 ",
+        ] {
+            let (time, fraction_s) = UtcTime::parse_reference(text).expect(text);
+            assert_eq!(
+                (time.to_string().as_str(), fraction_s),
+                ("2024-01-31T12:01:00Z", 0.0),
+                "{text}"
+            );
+        }
+        let read = |text: &str| UtcTime::parse_reference(text).map(|(t, f)| (t.to_string(), f));
+        let half = Some(("2024-01-31T12:00:59Z".to_owned(), 0.5));
+        assert_eq!(read("2024-01-31T12:00:59.500Z"), half);
+        assert_eq!(
+            read("1970-1-1"),
+            Some(("1970-01-01T00:00:00Z".into(), 0.0)),
+            "a day without a clock"
+        );
+        for text in [
+            "",
+            "time_reference",
+            "epoch",
+            "2024-01-31 12:61:00",
+            "2024-01-31 25:00:00",
+            "2024-02-30",
+            "31-01-2024",
+            "2024-01-31 12:00:00 CET",
+            "2024-01-31 12.5",
+            "2024-01-31T12:00:00+99:00",
+            "2024-01",
+            "１970-01-01",
+        ] {
+            assert_eq!(read(text), None, "{text}");
+        }
     }
 
     #[test]

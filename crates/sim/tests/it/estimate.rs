@@ -226,6 +226,87 @@ fn another_estimator_sees_the_truth_of_the_same_signals() {
     assert_eq!(of("run"), of("est"));
 }
 
+/// Largest difference of the mean velocities of two maps, m/s.
+fn largest_difference_m_s(folder: &Path, maps: [&str; 2]) -> f64 {
+    let [a, b] = maps.map(|map| column(&folder.join(map).join("map.csv"), "v_mean_m_s"));
+    assert_eq!(a.len(), b.len());
+    let differences = a.into_iter().zip(b).map(|both| {
+        let (a, b) = (f64::from_bits(both.0), f64::from_bits(both.1));
+        assert_eq!(a.is_nan(), b.is_nan());
+        if a.is_nan() { 0.0 } else { (a - b).abs() }
+    });
+    differences.fold(0.0, f64::max)
+}
+
+#[test]
+fn the_zero_of_a_converter_moves_no_velocity() {
+    let temp = recorded_run("");
+    let folder = temp.path();
+    let (currents, _) = samples(folder);
+    let largest = currents
+        .iter()
+        .fold(0.0_f64, |most, one| most.max(one.abs()));
+    let code = |zero: f64| {
+        let codes = currents
+            .iter()
+            .map(move |one| (one / largest * 9000.0 + zero).round());
+        codes.map(|code| code as i32)
+    };
+    let signed: Vec<u8> = code(0.0)
+        .flat_map(|code| (code as i16).to_le_bytes())
+        .collect();
+    let unsigned: Vec<u8> = code(32_768.0)
+        .flat_map(|code| (code as u16).to_le_bytes())
+        .collect();
+    let offset: Vec<u8> = code(3000.0)
+        .flat_map(|code| (code as i16).to_le_bytes())
+        .collect();
+    let rectangular = "weighting = \"rectangular\"\n";
+    for (method, weighting) in [
+        ("likelihood", ""),
+        ("first_moment", rectangular),
+        ("pulse_pair", rectangular),
+    ] {
+        let scene = fs::read_to_string(folder.join("s.toml")).unwrap();
+        let estimator = format!("[estimator]\nmethod.kind = \"{method}\"\n{weighting}");
+        fs::write(folder.join("m.toml"), scene + &estimator).unwrap();
+        for (name, bytes, kind) in [
+            ("signed", &signed, "i16"),
+            ("unsigned", &unsigned, "u16"),
+            ("offset", &offset, "i16"),
+        ] {
+            fs::write(folder.join(name), bytes).unwrap();
+            let out = wakescope(
+                folder,
+                &[
+                    "estimate",
+                    name,
+                    "--format",
+                    kind,
+                    "--scene",
+                    "m.toml",
+                    "--out",
+                    "e",
+                    "--overwrite",
+                ],
+            );
+            assert!(out.status.success(), "{method} {name}: {out:?}");
+            let message = String::from_utf8_lossy(&out.stderr).into_owned();
+            assert_eq!(
+                message.contains("it is subtracted"),
+                name == "offset",
+                "{message}"
+            );
+            fs::rename(folder.join("e"), folder.join(format!("{method}-{name}"))).unwrap();
+        }
+        let of = |name: &str| format!("{method}-{name}");
+        let both = |name: &str| largest_difference_m_s(folder, [&of("signed"), &of(name)]);
+        assert_eq!(both("unsigned"), 0.0, "{method}");
+        // The mean of the codes without an offset is not 0, but far below their scatter.
+        assert!(both("offset") < 0.02, "{method}: {}", both("offset"));
+    }
+}
+
 #[test]
 fn every_format_and_order_gives_the_velocities_of_the_run() {
     let temp = recorded_run("");

@@ -134,6 +134,7 @@ impl FinishedWake {
                 path,
                 place: Some(0),
                 time_s: 0.0,
+                reference: None,
             };
             let VolumeComponent {
                 nodes_m: [x, y, z],

@@ -120,6 +120,8 @@ pub struct RawRecords {
     fills: Vec<f64>,
     /// The factor that the numbers of the source have had.
     packed_scale: f64,
+    /// The number that stands for zero, which is subtracted before the scale: the middle code of a converter without sign.
+    pub zero: f64,
     /// What its numbers are multiplied with, A for signals in counts.
     pub scale: f64,
     /// Samples of this size and above are missing.
@@ -185,6 +187,7 @@ impl RawRecords {
                 FILL_VALUES.to_vec()
             },
             packed_scale: 1.0,
+            zero: 0.0,
             scale: 1.0,
             outsized: f64::INFINITY,
             about: About::default(),
@@ -241,7 +244,7 @@ impl RawRecords {
             if self.fills.contains(&stored) {
                 f64::NAN
             } else {
-                stored * self.scale
+                (stored - self.zero) * self.scale
             }
         };
         for sample in &mut found {
@@ -347,6 +350,7 @@ impl Numbers<'_> {
         let samples = samples.ok_or("it holds a single number, no records")? as usize;
         let (records, is_complex) = (lengths.iter().product::<u64>() as usize, stored.is_complex);
         let are_integers = !stored.number.is_float();
+        let zero = stored.number.zero();
         let array = ArrayInFile {
             file,
             stored,
@@ -355,13 +359,10 @@ impl Numbers<'_> {
             samples,
             pulses_per_line: shape.pulses_per_line,
         };
-        Ok(RawRecords::new(
-            path,
-            array,
-            [records, samples],
-            is_complex,
-            are_integers,
-        ))
+        Ok(RawRecords {
+            zero,
+            ..RawRecords::new(path, array, [records, samples], is_complex, are_integers)
+        })
     }
 
     fn of_archive(self, mut file: File, length: u64) -> Result<RawRecords, String> {

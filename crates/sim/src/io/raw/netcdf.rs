@@ -5,6 +5,8 @@
 use super::{About, RawFormat, RawRecords, Source};
 use crate::Error;
 use crate::io::netcdf_input::{NetcdfFile, open};
+use crate::io::number::middle_code;
+use crate::io::variable;
 use netcdf_reader::NcType;
 use num_complex::Complex;
 use std::ops::Range;
@@ -68,13 +70,24 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
     };
     let number = |attribute: &str| file.number(&name, attribute);
     let scale = number("scale_factor").unwrap_or(1.0);
-    let is_filled = number("_FillValue").or(number("missing_value")).is_some();
-    // What stands where nothing was written; every byte may be a number.
-    let (are_integers, fill) = match file.kind(&name) {
-        Some(NcType::Float | NcType::Double) => (false, None),
-        Some(NcType::Short) => (true, Some(-32767.0)),
-        Some(NcType::Int) => (true, Some(-2_147_483_647.0)),
-        _ => (true, None),
+    let (bits, is_unsigned) = match file.kind(&name) {
+        Some(NcType::Float | NcType::Double) => (0, false),
+        Some(NcType::Byte) => (8, false),
+        Some(NcType::UByte) => (8, true),
+        Some(NcType::Short) => (16, false),
+        Some(NcType::UShort) => (16, true),
+        Some(NcType::UInt) => (32, true),
+        _ => (32, false),
+    };
+    let are_integers = bits > 0;
+    let is_unsigned = match file.text(&name, "_Unsigned") {
+        Some(text) => are_integers && text.eq_ignore_ascii_case("true"),
+        None => is_unsigned,
+    };
+    // An offset says itself which code is zero.
+    let zero = match is_unsigned && number("add_offset").is_none() {
+        true => scale * middle_code(bits),
+        false => 0.0,
     };
     let (shape, is_complex) = (
         [lengths.iter().product::<u64>() as usize, samples as usize],
@@ -88,14 +101,11 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
         are_pairs,
         lengths,
     };
-    let mut out = RawRecords::new(path, source, shape, is_complex, are_integers);
-    let unwritten = fill.filter(|_| !is_filled);
-    out.fills
-        .extend(unwritten.map(|fill| fill * scale + number("add_offset").unwrap_or(0.0)));
     Ok(RawRecords {
         packed_scale: scale,
+        zero,
         about,
-        ..out
+        ..RawRecords::new(path, source, shape, is_complex, are_integers)
     })
 }
 
@@ -168,31 +178,17 @@ fn about(file: &NetcdfFile, records: usize) -> Result<About, String> {
         scene_toml: file.global_text("scene").map(str::to_owned),
         ..About::default()
     };
-    let of_records = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
-        let Some(name) = names.into_iter().find(|name| file.has(name)) else {
-            return Ok(None);
-        };
-        let units = file
-            .text(name, "units")
-            .unwrap_or_default()
-            .to_ascii_lowercase();
-        let values = file.floats(name)?;
-        let factor = if units.starts_with("deg") {
-            1f64.to_radians()
-        } else {
-            1.0
-        };
-        match values.len() == records {
-            true => Ok(Some(
-                values.into_iter().map(|value| value * factor).collect(),
-            )),
-            // A coordinate of the samples, such as time, is none of the records.
-            false => Ok(None),
-        }
-    };
-    about.elevation_rad = of_records(["elevation", "elevation_rad"])?;
-    about.time_s = of_records(["pulse_time", "ray_time"])?;
-    about.line = of_records(["ray_line", "line"])?;
+    // A coordinate of the samples, such as time, is none of the records.
+    let of_records = |values: Vec<f64>| Some(values).filter(|values| values.len() == records);
+    let elevations = variable::elevations_rad(file)?;
+    about.elevation_rad = elevations.and_then(|(_, elevation_rad)| of_records(elevation_rad));
+    let first = |names: [&'static str; 2]| names.into_iter().find(|name| file.has(name));
+    if let Some(name) = first(["pulse_time", "ray_time"]) {
+        about.time_s = of_records(file.seconds(name)?);
+    }
+    if let Some(name) = first(["ray_line", "line"]) {
+        about.line = of_records(file.floats(name)?);
+    }
     for name in CONSTANTS.split(' ').filter(|name| file.has(name)) {
         about
             .constants
@@ -281,6 +277,31 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn the_middle_code_of_bytes_without_sign_is_zero_unless_an_offset_says_otherwise() {
+        const DIMS: &[&str] = &["line", "sample"];
+        let first = |attributes: &[(&'static str, f64)]| {
+            let codes = Data::i8([0, 100, -128, -1, 1, 2, 3, 4]);
+            let mut variable = Variable::new("current_a", DIMS, codes).text("_Unsigned", "true");
+            for (name, value) in attributes {
+                variable = variable.attr(name, Data::f64([*value]));
+            }
+            let layout = Layout {
+                dims: vec![("line", 2), ("sample", 4)],
+                globals: Vec::new(),
+                variables: vec![variable],
+            };
+            let bytes = layout.into_bytes(&crate::io::provenance::example());
+            let mut found = opened(bytes.unwrap(), &RawFormat::default());
+            let record = found.read(0..1).unwrap();
+            record.iter().map(|sample| sample.re).collect::<Vec<_>>()
+        };
+        assert_eq!(first(&[]), [-128.0, -28.0, 0.0, 127.0]);
+        assert_eq!(first(&[("scale_factor", 0.5)]), [-64.0, -14.0, 0.0, 63.5]);
+        let stated = [("scale_factor", 0.5), ("add_offset", -64.0)];
+        assert_eq!(first(&stated), [-64.0, -14.0, 0.0, 63.5]);
     }
 
     /// Lines with pulses with samples, and what stands beside them, as another program may have stored a `signals.nc` again.

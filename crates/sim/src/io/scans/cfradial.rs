@@ -1,34 +1,25 @@
 //! Scans from CfRadial 1.x by any writer, and from the groups of NetCDF-4 files that hold a sweep each (CfRadial 2, Windcube).
 //!
-//! A sweep is a scan if its elevations differ and its azimuths do not, whatever it calls itself. Velocities are found by their
-//! standard names, which say the sign, or by the names that instruments use. Check: maps of this program, and of Py-ART and
-//! xradar in the tests of the program; files without Nyquist velocity, with ragged gates, another sign, several sweeps.
+//! A sweep is a scan if its elevations differ and its azimuths do not, whatever it calls itself; rays of another Nyquist velocity are
+//! another scan. Variables are read as `variable` says. Check: maps of this program, and of Py-ART and xradar in the tests of the program;
+//! files without Nyquist velocity, with ragged gates, another sign, several sweeps.
 
 use super::grid::{RayRow, mean_count, of_mean, scan_map};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::netcdf_input::NetcdfFile;
 use crate::io::units::Quantity;
+use crate::io::variable::{
+    self, AZIMUTH, ELEVATION, NYQUIST, PULSE_WIDTH, RANGE, RATIO, SIGMA, TOWARDS, TRANSITION,
+    Times, VELOCITY, ZENITH,
+};
 use crate::io::{UtcTime, cfradial::MIRRORED};
 use crate::machine;
 use std::path::Path;
 
-const AWAY: &str = "radial_velocity_of_scatterers_away_from_instrument";
-const TOWARDS: &str = "radial_velocity_of_scatterers_toward_instrument";
-/// Names of the velocity where no standard name says it, positive away.
-const VELOCITIES: &str = "radial_velocity velocity radial_wind_speed VEL VR VRAD VRADH doppler_velocity mean_doppler_velocity";
-/// Names of its standard deviation.
-const SIGMAS: [&str; 4] = [
-    "velocity_standard_deviation",
-    "sigma_m_s",
-    "radial_velocity_error",
-    "velocity_error",
-];
 /// Whether a Windcube trusts a velocity; its times are those of the ends of rays.
 const STATUS: &str = "radial_wind_speed_status";
-/// The largest velocity that can be told apart, m/s: that of the first ray is taken.
-const NYQUIST: &str = "nyquist_velocity";
-/// Names of the signal-to-noise ratio in dB.
-const RATIOS: [&str; 4] = ["signal_to_noise_ratio", "SNR", "snr", "cnr"];
+/// Nyquist velocities that differ by less than this fraction are one.
+const ONE_NYQUIST: f64 = 1e-3;
 
 /// The scans of a file or a group, and what was left out; `sweep` is the number of its first sweep.
 pub(super) fn scans(
@@ -38,18 +29,8 @@ pub(super) fn scans(
     sweep: usize,
 ) -> Result<Found, String> {
     let (range_m, velocity) = (ranges(file)?, Field::velocity(file, format)?);
-    let (rays, reference, scans) = rays(file, format, &velocity, range_m.len())?;
-    let moving = optional(file, "antenna_transition")?;
-    // Mirrored velocities are no multiple away from those of the air.
-    let is_mirrored = file
-        .text(NYQUIST, "folding")
-        .is_some_and(|folding| folding == MIRRORED);
-    let fold_m_s = if is_mirrored {
-        None
-    } else {
-        first(file, NYQUIST)?.map(|nyquist| 2.0 * nyquist)
-    };
-    let pulse_width_s = first(file, "pulse_width")?;
+    let rays = Rays::read(file, format, &velocity, range_m.len())?;
+    let pulse_width_s = pulse_width(file)?;
     let place_deg = place(file)?;
     let of_field = |name| file.text(&velocity.name, name);
     let scene_toml = file
@@ -59,114 +40,214 @@ pub(super) fn scans(
     let is_own = file
         .global_text("source")
         .is_some_and(|source| source.starts_with("wakescope "));
-    let (mut out, mut left_out) = (Vec::new(), Vec::new());
-    for (number, range) in sweeps(file, rays.len())?.into_iter().enumerate() {
+    let mut found = Found {
+        warnings: rays.warnings,
+        ..Found::default()
+    };
+    for (number, range) in rays.sweeps.into_iter().enumerate() {
         let number = number + sweep;
         let what = format!("sweep {number}");
-        let is_still = |ray: &usize| moving.get(*ray).is_none_or(|moves| *moves != 1.0);
-        let rows: Vec<RayRow> = range
-            .filter(is_still)
-            .map(|ray| rays[ray].clone())
-            .collect();
-        let (found, skipped) = match planes::in_order(rows) {
-            Ok(split) => split,
-            Err(reason) => {
-                left_out.push(format!("{what}: {reason}"));
-                continue;
-            }
-        };
-        left_out.extend(skipped.iter().map(|text| format!("{what}: {text}")));
-        for scan in found {
-            match scan_map(scan.rays, range_m.clone(), fold_m_s, &what) {
-                Err(reason) => left_out.push(reason),
-                Ok(map) => out.push(ReadScan {
-                    azimuth_rad: scan.azimuth_rad,
-                    place_deg,
-                    reference,
-                    gate_length_m: range_m.get(1).map(|second_m| second_m - range_m[0]),
-                    pulse_width_s,
-                    scene_toml: scene_toml.map(str::to_owned),
-                    is_own,
-                    scans,
-                    ..ReadScan::new(path, number, map)
-                }),
+        let known: Vec<usize> = range.filter(|ray| rays.is_still[*ray]).collect();
+        for (fold_m_s, own) in by_fold(&known, &rays.fold_m_s) {
+            let rows: Vec<RayRow> = own.iter().map(|ray| rays.rows[*ray].clone()).collect();
+            let (scans, skipped) = match planes::in_order(rows) {
+                Ok(split) => split,
+                Err(reason) => {
+                    found.left_out.push(format!("{what}: {reason}"));
+                    continue;
+                }
+            };
+            let skipped = skipped.iter().map(|text| format!("{what}: {text}"));
+            found.left_out.extend(skipped);
+            for scan in scans {
+                match scan_map(scan.rays, range_m.clone(), fold_m_s, &what) {
+                    Err(reason) => found.left_out.push(reason),
+                    Ok(map) => found.scans.push(ReadScan {
+                        azimuth_rad: scan.azimuth_rad,
+                        place_deg,
+                        reference: rays.reference,
+                        gate_length_m: range_m.get(1).map(|second_m| second_m - range_m[0]),
+                        pulse_width_s,
+                        scene_toml: scene_toml.map(str::to_owned),
+                        is_own,
+                        scans: rays.scans,
+                        ..ReadScan::new(path, number, map)
+                    }),
+                }
             }
         }
     }
-    Ok((out, left_out))
+    Ok(found)
 }
 
-/// All rays, the date from which their times count, and the scans of which their velocities are means.
-fn rays(
-    file: &NetcdfFile,
-    format: &ScanFormat,
-    velocity: &Field,
-    gates: usize,
-) -> Result<(Vec<RayRow>, Option<UtcTime>, f64), String> {
-    let (elevation_rad, azimuth_rad) = (angles(file, "elevation")?, angles(file, "azimuth")?);
-    let count = elevation_rad.len();
-    if azimuth_rad.len() != count {
-        return Err(format!(
-            "azimuth has {} values, elevation {count}: one for each ray",
-            azimuth_rad.len()
-        ));
-    }
-    let (time_s, reference) = times(file, count)?;
-    let layout = GateLayout::new(file, &velocity.name, count, gates)?;
-    let velocity_m_s = layout.read(file, &velocity.name)?;
-    // A fraction of realisations, or 0 and 1.
-    let flagged = layout.optional(file, &["flagged"])?;
-    // 1 where the instrument trusts its velocity.
-    let status = layout.optional(file, &[STATUS])?;
-    let ratio_db = if format.min_snr_db.is_some() {
-        layout.optional(file, &RATIOS)?
-    } else {
-        None
-    };
-    let sigma_m_s = layout.optional(file, &SIGMAS)?;
-    let realisations = if velocity.is_mean {
-        layout.optional(file, &["count"])?
-    } else {
-        None
-    };
-    let known = |at: usize| {
-        let is_noise = ratio_db
-            .as_ref()
-            .is_some_and(|ratios_db| format.is_noise(ratios_db[at]))
-            || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
-            || status.as_ref().is_some_and(|status| status[at] != 1.0);
-        if is_noise {
-            f64::NAN
-        } else {
-            velocity.sign * velocity_m_s[at]
-        }
-    };
-    let ray = |ray: usize| {
-        let cells = ray * gates..(ray + 1) * gates;
-        let sigma = |sigma_m_s: &Vec<f64>| {
-            let of =
-                |at: usize| of_mean(sigma_m_s[at], realisations.as_ref().map(|count| count[at]));
-            cells.clone().map(of).collect()
+/// Whether a file or a group has rays.
+pub(super) fn has_rays(file: &NetcdfFile) -> bool {
+    variable::find(file, &ELEVATION).is_some() || variable::find(file, &ZENITH).is_some()
+}
+
+/// The rays of a file.
+struct Rays {
+    rows: Vec<RayRow>,
+    /// Whether the head did not move to another place during a ray.
+    is_still: Vec<bool>,
+    /// Multiples of which velocities may lack, m/s, for each ray; NaN of none.
+    fold_m_s: Vec<f64>,
+    sweeps: Vec<std::ops::Range<usize>>,
+    /// The date from which times count.
+    reference: Option<UtcTime>,
+    /// Scans of which velocities are means.
+    scans: f64,
+    warnings: Vec<String>,
+}
+
+impl Rays {
+    fn read(
+        file: &NetcdfFile,
+        format: &ScanFormat,
+        velocity: &Field,
+        gates: usize,
+    ) -> Result<Self, String> {
+        let (_, elevation_rad) =
+            variable::elevations_rad(file)?.ok_or("it has no variable elevation")?;
+        let count = elevation_rad.len();
+        let sweeps = sweeps(file, count)?;
+        let of_rays = |known, quantity| match variable::find(file, known) {
+            Some(name) => {
+                let values = variable::values(file, name, quantity)?;
+                variable::of_rays(name, values, count, &sweeps).map(Some)
+            }
+            None => Ok::<_, String>(None),
         };
-        RayRow {
+        let azimuth_rad =
+            of_rays(&AZIMUTH, Quantity::Angle)?.ok_or("it has no variable azimuth")?;
+        let nyquist_m_s = of_rays(&NYQUIST, Quantity::Velocity)?;
+        let moving = match variable::find(file, &TRANSITION) {
+            Some(name) => Some(variable::of_rays(name, file.floats(name)?, count, &sweeps)?),
+            None => None,
+        };
+        let times = times(file, count)?;
+        let layout = GateLayout::new(file, &velocity.name, count, gates)?;
+        let cells = Cells::read(file, format, velocity, &layout)?;
+        let row = |ray: usize| RayRow {
             elevation_rad: elevation_rad[ray],
             azimuth_rad: azimuth_rad[ray],
-            time_s: time_s[ray],
-            sigma_m_s: sigma_m_s.as_ref().map(sigma).unwrap_or_default(),
-            velocity_m_s: cells.map(known).collect(),
+            time_s: times.time_s[ray],
+            ..cells.row(ray * gates..(ray + 1) * gates)
+        };
+        let is_still = |ray: usize| moving.as_ref().is_none_or(|moves| moves[ray] != 1.0);
+        // Mirrored velocities are no multiple away from those of the air.
+        let is_mirrored = variable::find(file, &NYQUIST)
+            .and_then(|name| file.text(name, "folding"))
+            .is_some_and(|folding| folding == MIRRORED);
+        let fold_m_s = nyquist_m_s.filter(|_| !is_mirrored).unwrap_or_default();
+        let fold = |ray: usize| fold_m_s.get(ray).map_or(f64::NAN, |nyquist| 2.0 * nyquist);
+        Ok(Self {
+            rows: (0..count).map(row).collect(),
+            is_still: (0..count).map(is_still).collect(),
+            fold_m_s: (0..count).map(fold).collect(),
+            sweeps,
+            reference: times.reference,
+            scans: mean_count(cells.realisations.iter().flatten().copied()),
+            warnings: times.not_understood.into_iter().collect(),
+        })
+    }
+}
+
+/// Rays in groups of one Nyquist velocity, with the multiple of which their velocities may lack: its double, if it is known.
+fn by_fold(rays: &[usize], fold_m_s: &[f64]) -> Vec<(Option<f64>, Vec<usize>)> {
+    let mut groups: Vec<(Option<f64>, Vec<usize>)> = Vec::new();
+    for ray in rays {
+        let own = Some(fold_m_s[*ray]).filter(|fold| *fold > 0.0 && fold.is_finite());
+        let is_same = |(fold, _): &&mut (Option<f64>, Vec<usize>)| match (*fold, own) {
+            (Some(fold), Some(own)) => (own / fold - 1.0).abs() < ONE_NYQUIST,
+            (fold, own) => fold == own,
+        };
+        match groups.iter_mut().find(is_same) {
+            Some((_, group)) => group.push(*ray),
+            None => groups.push((own, vec![*ray])),
         }
-    };
-    Ok((
-        (0..count).map(ray).collect(),
-        reference,
-        mean_count(realisations.iter().flatten().copied()),
-    ))
+    }
+    groups
+}
+
+/// What the gates of all rays hold, one ray after the other.
+struct Cells {
+    /// Positive away, NaN where noise or the instrument says that it is none.
+    velocity_m_s: Vec<f64>,
+    sigma_m_s: Option<Vec<f64>>,
+    /// Of how many each velocity is the mean.
+    realisations: Option<Vec<f64>>,
+}
+
+impl Cells {
+    fn read(
+        file: &NetcdfFile,
+        format: &ScanFormat,
+        velocity: &Field,
+        layout: &GateLayout,
+    ) -> Result<Self, String> {
+        let mut velocity_m_s = layout.spread(
+            &velocity.name,
+            variable::values(file, &velocity.name, Quantity::Velocity)?,
+        )?;
+        // A fraction of realisations, or 0 and 1.
+        let flagged = layout.optional(file, "flagged")?;
+        // 1 where the instrument trusts its velocity.
+        let status = layout.optional(file, STATUS)?;
+        let ratio_db = match (format.min_snr_db, variable::find(file, &RATIO)) {
+            (None, _) => None,
+            (Some(_), Some(name)) => Some(layout.spread(name, variable::ratio_db(file, name)?)?),
+            (Some(_), None) => return Err(super::NO_RATIO.to_owned()),
+        };
+        for (at, value) in velocity_m_s.iter_mut().enumerate() {
+            let is_noise = ratio_db
+                .as_ref()
+                .is_some_and(|ratios_db| format.is_noise(ratios_db[at]))
+                || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
+                || status.as_ref().is_some_and(|status| status[at] != 1.0);
+            *value = if is_noise {
+                f64::NAN
+            } else {
+                velocity.sign * *value
+            };
+        }
+        let sigma_m_s = match variable::find(file, &SIGMA) {
+            Some(name) => {
+                let values = variable::values(file, name, Quantity::Velocity)?;
+                Some(layout.spread(name, values)?)
+            }
+            None => None,
+        };
+        let realisations = match velocity.is_mean {
+            true => layout.optional(file, "count")?,
+            false => None,
+        };
+        Ok(Self {
+            velocity_m_s,
+            sigma_m_s,
+            realisations,
+        })
+    }
+
+    /// The velocities of a ray, and their standard deviations.
+    fn row(&self, cells: std::ops::Range<usize>) -> RayRow {
+        let count = |at: usize| self.realisations.as_ref().map(|count| count[at]);
+        let sigma = |sigma_m_s: &Vec<f64>| {
+            let own = cells.clone().map(|at| of_mean(sigma_m_s[at], count(at)));
+            own.collect()
+        };
+        RayRow {
+            sigma_m_s: self.sigma_m_s.as_ref().map(sigma).unwrap_or_default(),
+            velocity_m_s: self.velocity_m_s[cells.clone()].to_vec(),
+            ..RayRow::default()
+        }
+    }
 }
 
 /// The variable that holds the velocities.
 struct Field {
     name: String,
-    /// 1 for velocities in m/s that are positive away from the lidar.
+    /// 1 for velocities that are positive away from the lidar.
     sign: f64,
     /// Whether it is the mean of several scans.
     is_mean: bool,
@@ -174,33 +255,20 @@ struct Field {
 
 impl Field {
     fn velocity(file: &NetcdfFile, format: &ScanFormat) -> Result<Self, String> {
-        let standard = |name: &str| file.text(name, "standard_name").unwrap_or_default();
         let name = match &format.field {
             Some(name) if file.has(name) => name.clone(),
             Some(name) => return Err(format!("it has no variable {name}, which --field names")),
-            None => {
-                let known = VELOCITIES
-                    .split(' ')
-                    .find(|name| file.has(name))
-                    .map(str::to_owned);
-                let by_standard = || {
-                    file.names()
-                        .find(|name| [AWAY, TOWARDS].contains(&standard(name)))
-                        .map(str::to_owned)
-                };
-                known.or_else(by_standard).ok_or(
-                    "it has no radial velocity: none of its variables has that standard name or a usual name; --field names it",
-                )?
-            }
+            None => variable::find(file, &VELOCITY)
+                .map(str::to_owned)
+                .ok_or("it has no radial velocity: none of its variables has that standard name or a usual name; --field names it")?,
         };
-        let unit_m_s = file.unit(&name, Quantity::Velocity)?;
-        let is_towards = standard(&name) == TOWARDS || format.towards;
+        let is_towards = file.text(&name, "standard_name") == Some(TOWARDS) || format.towards;
         let is_mean = file
             .text(&name, "cell_methods")
             .is_some_and(|methods| methods.contains("realization: mean"));
         Ok(Self {
             name,
-            sign: if is_towards { -unit_m_s } else { unit_m_s },
+            sign: if is_towards { -1.0 } else { 1.0 },
             is_mean,
         })
     }
@@ -261,9 +329,9 @@ impl GateLayout {
         }
     }
 
-    /// The values \[ray, gate\], one ray after the other.
-    fn read(&self, file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
-        let (values, rays, gates) = (file.floats(name)?, self.rays.len(), self.gates);
+    /// The values \[ray, gate\] of a variable, one ray after the other; NaN for gates that a ray does not have.
+    fn spread(&self, name: &str, values: Vec<f64>) -> Result<Vec<f64>, String> {
+        let (rays, gates) = (self.rays.len(), self.gates);
         let count = values.len();
         if self.is_full && count != rays * gates {
             return Err(format!(
@@ -280,71 +348,68 @@ impl GateLayout {
         Ok(out)
     }
 
-    /// The first of some variables that is there.
-    fn optional(&self, file: &NetcdfFile, names: &[&str]) -> Result<Option<Vec<f64>>, String> {
-        match names.iter().find(|name| file.has(name)) {
-            Some(name) => self.read(file, name).map(Some),
-            None => Ok(None),
+    /// The plain numbers of a variable, if it is there.
+    fn optional(&self, file: &NetcdfFile, name: &str) -> Result<Option<Vec<f64>>, String> {
+        match file.has(name) {
+            true => self.spread(name, file.floats(name)?).map(Some),
+            false => Ok(None),
         }
     }
 }
 
-/// An angle of each ray, rad; NaN where it is missing.
-fn angles(file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
-    let units = file
-        .text(name, "units")
-        .unwrap_or_default()
-        .to_ascii_lowercase();
-    let values = file.floats(name)?;
-    match units.starts_with("rad") {
-        true => Ok(values),
-        false => Ok(values.into_iter().map(f64::to_radians).collect()),
-    }
-}
-
-/// Ranges of the centres of the gates, m.
+/// Ranges of the centres of the gates, m, which are those of all rays.
 fn ranges(file: &NetcdfFile) -> Result<Vec<f64>, String> {
-    let unit_m = file.unit("range", Quantity::Length)?;
-    // One row for each ray where gates differ.
-    if file.shape("range").is_some_and(|shape| shape.len() > 1) {
-        return Err(
-            "range has two dimensions: gates that are the same for all rays are needed".into(),
-        );
+    let name = variable::find(file, &RANGE).ok_or("it has no variable range")?;
+    let range_m = variable::values(file, name, Quantity::Length)?;
+    match file.shape(name).as_deref() {
+        Some([_, gates]) => same_rows(name, &range_m, *gates as usize),
+        Some([] | [_]) => Ok(range_m),
+        _ => Err(format!("variable {name} has more than two dimensions")),
     }
-    Ok(file
-        .floats("range")?
-        .into_iter()
-        .map(|range| unit_m * range)
-        .collect())
 }
 
-/// Times of the rays in s, and the date from which they count.
-fn times(file: &NetcdfFile, count: usize) -> Result<(Vec<f64>, Option<UtcTime>), String> {
-    if !file.has("time") {
-        return Ok((vec![f64::NAN; count], None));
-    }
-    let units = file.text("time", "units").unwrap_or_default();
-    let since = units.split_once(" since ").map_or("", |(_, since)| since);
-    // 2024-01-31T12:00:00Z, or with a blank, without the time, with parts of a second or another zone at the end.
-    let mut text = since.trim().replace(' ', "T");
-    text.truncate(text.char_indices().nth(19).map_or(text.len(), |(at, _)| at));
-    if text.len() == 10 {
-        text += "T00:00:00";
-    }
-    let reference = UtcTime::parse(&format!("{text}Z"));
-    let mut time_s = file.seconds("time")?;
-    if file.has(STATUS) {
-        let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        let half_s = 0.5 * steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-        time_s.iter_mut().for_each(|time_s| *time_s -= half_s);
-    }
-    match time_s.len() {
-        found if found == count => Ok((time_s, reference)),
-        found => Err(format!(
-            "time has {found} values, elevation {count}: one for each ray"
+/// The one row that a variable repeats for each ray; rows without a value are passed over.
+fn same_rows(name: &str, values: &[f64], gates: usize) -> Result<Vec<f64>, String> {
+    let mut rows = values
+        .chunks_exact(gates.max(1))
+        .filter(|row| row.iter().all(|value| value.is_finite()));
+    let first = rows.next().unwrap_or_default();
+    let is_same = |row: &[f64]| {
+        row.iter()
+            .zip(first)
+            .all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs())
+    };
+    match rows.all(is_same) {
+        true => Ok(first.to_vec()),
+        // The ranges along the first dimension.
+        false if is_constant(values, gates) => Ok(values.iter().step_by(gates).copied().collect()),
+        false => Err(format!(
+            "{name} has two dimensions: gates that are the same for all rays are needed"
         )),
     }
+}
+
+/// Whether each row is one value.
+fn is_constant(values: &[f64], gates: usize) -> bool {
+    values
+        .chunks_exact(gates)
+        .all(|row| row.iter().all(|value| *value == row[0]))
+}
+
+/// Times of the middles of the rays.
+fn times(file: &NetcdfFile, count: usize) -> Result<Times, String> {
+    let mut times = variable::times(file, count)?;
+    if file.has(STATUS) {
+        let mut steps: Vec<f64> = times
+            .time_s
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .collect();
+        steps.sort_by(f64::total_cmp);
+        let half_s = 0.5 * steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+        times.time_s.iter_mut().for_each(|time_s| *time_s -= half_s);
+    }
+    Ok(times)
 }
 
 /// The rays of each sweep.
@@ -366,18 +431,24 @@ fn sweeps(file: &NetcdfFile, count: usize) -> Result<Vec<std::ops::Range<usize>>
     starts.iter().zip(&ends).enumerate().map(range).collect()
 }
 
-/// The values of a variable; none where it is not there.
-fn optional(file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
-    if file.has(name) {
-        file.floats(name)
-    } else {
-        Ok(Vec::new())
-    }
+/// The duration of a pulse, s: the first one above 0, if the file has any.
+fn pulse_width(file: &NetcdfFile) -> Result<Option<f64>, String> {
+    let Some(name) = variable::find(file, &PULSE_WIDTH) else {
+        return Ok(None);
+    };
+    let values = variable::values(file, name, Quantity::Time)?;
+    Ok(values
+        .first()
+        .copied()
+        .filter(|value| *value > 0.0 && value.is_finite()))
 }
 
 /// Latitude and longitude of an instrument that stands, degrees; nothing where they are missing or change from ray to ray.
 fn place(file: &NetcdfFile) -> Result<Option<[f64; 2]>, String> {
-    let [latitude, longitude] = ["latitude", "longitude"].map(|name| optional(file, name));
+    let [latitude, longitude] = ["latitude", "longitude"].map(|name| match file.has(name) {
+        true => file.floats(name),
+        false => Ok(Vec::new()),
+    });
     match (&latitude?[..], &longitude?[..]) {
         ([latitude], [longitude]) if (latitude + longitude).is_finite() => {
             Ok(Some([*latitude, *longitude]))
@@ -386,20 +457,13 @@ fn place(file: &NetcdfFile) -> Result<Option<[f64; 2]>, String> {
     }
 }
 
-/// The first value of a variable, if it is there and above 0.
-fn first(file: &NetcdfFile, name: &str) -> Result<Option<f64>, String> {
-    Ok(optional(file, name)?
-        .first()
-        .copied()
-        .filter(|value| *value > 0.0 && value.is_finite()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::io::netcdf::{self, Data};
     use crate::io::netcdf_input::open;
     use crate::io::provenance::example;
+    use crate::io::variable::AWAY;
     use std::collections::BTreeMap;
 
     /// Variables with their lengths, text attributes and values.
@@ -503,7 +567,8 @@ mod tests {
     }
 
     fn read(made: &Made) -> Result<(Vec<ReadScan>, Vec<String>), String> {
-        scans(&made.open(), Path::new("x.nc"), &ScanFormat::default(), 0)
+        let found = scans(&made.open(), Path::new("x.nc"), &ScanFormat::default(), 0)?;
+        Ok((found.scans, found.left_out))
     }
 
     #[test]
@@ -617,6 +682,75 @@ mod tests {
         );
     }
 
+    #[test]
+    fn each_ray_has_its_own_nyquist_velocity() {
+        let folds = |shape: u64, values: Vec<f64>| {
+            let mut made = made();
+            let up = (0..RAYS).map(|ray| 2.0 + (ray % 6) as f64).collect();
+            made.0.get_mut("azimuth").unwrap().2 = vec![90.0; RAYS];
+            made.0.get_mut("elevation").unwrap().2 = up;
+            let nyquist = (vec![shape], vec![("units", "cm s-1")], values);
+            made.0.insert("nyquist_velocity", nyquist);
+            let found = read(&made).unwrap().0;
+            let fold = |scan: &ReadScan| (scan.map.elevation_rad.len(), scan.map.fold_m_s);
+            found.iter().map(fold).collect::<Vec<_>>()
+        };
+        let both = [(6, Some(60.0)), (6, Some(20.0))];
+        let of_rays = (0..RAYS).map(|ray| if ray < 6 { 3000.0 } else { 1000.0 });
+        assert_eq!(folds(RAYS as u64, of_rays.collect()), both);
+        assert_eq!(folds(2, vec![3000.0, 1000.0]), both);
+        // Every other ray; 18 velocities of each are too few for a scan, 30 are enough.
+        let in_turn = (0..RAYS).map(|ray| if ray % 6 == 5 { 1000.0 } else { 3000.0 });
+        assert_eq!(folds(RAYS as u64, in_turn.collect()), [(5, Some(60.0)); 2]);
+    }
+
+    #[test]
+    fn ranges_of_each_ray_are_read_where_they_are_the_same() {
+        let with = |range_m: &dyn Fn(usize, usize) -> f64| {
+            let mut made = made();
+            let all = (0..RAYS * GATES).map(|i| range_m(i / GATES, i % GATES));
+            let shape = vec![RAYS as u64, GATES as u64];
+            made.0
+                .insert("range", (shape, vec![("units", "m")], all.collect()));
+            read(&made).map(|(found, _)| found[0].map.range_m.clone())
+        };
+        let one = |ray: usize, gate: usize| match ray {
+            3 => f64::NAN,
+            _ => 300.0 + 10.0 * gate as f64,
+        };
+        assert_eq!(
+            with(&one),
+            Ok((0..GATES).map(|gate| one(0, gate)).collect())
+        );
+        let refused = with(&|ray, gate| (ray + gate) as f64).unwrap_err();
+        assert!(
+            refused.contains("gates that are the same for all rays"),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn a_least_ratio_needs_a_variable_and_takes_it_in_any_unit() {
+        let loud = ScanFormat {
+            min_snr_db: Some(-10.0),
+            ..ScanFormat::default()
+        };
+        let known = |made: &Made| {
+            let found = scans(&made.open(), Path::new("x.nc"), &loud, 0)?;
+            let velocities = &found.scans[0].map.velocity_m_s;
+            Ok::<_, String>(velocities.iter().filter(|v| v.is_finite()).count())
+        };
+        let mut made = made();
+        assert!(known(&made).unwrap_err().contains("--min-snr"));
+        let ratio: Vec<f64> = (0..RAYS * GATES)
+            .map(|i| if i % GATES == 0 { 1.05 } else { 1.2 })
+            .collect();
+        let shape = vec![RAYS as u64, GATES as u64];
+        let intensity = (shape, vec![("units", "unitless")], ratio);
+        made.0.insert("intensity", intensity);
+        assert_eq!(known(&made), Ok(30));
+    }
+
     /// Rays of different lengths can ask for far more than the file holds.
     #[test]
     fn gates_that_no_memory_holds_are_refused_before_they_are_made() {
@@ -663,7 +797,7 @@ mod tests {
         assert!(refused(&|m| drop(m.0.remove("elevation"))).contains("elevation"));
         assert!(
             refused(&|m| m.0.get_mut("VEL").unwrap().1 = vec![("units", "furlongs")])
-                .contains("units of VEL")
+                .contains("VEL has units = \"furlongs\"")
         );
         assert!(
             refused(&|m| m.0.get_mut("time").unwrap().2 = vec![0.0]).contains("time has 1 values")

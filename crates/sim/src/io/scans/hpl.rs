@@ -7,6 +7,8 @@
 use super::grid::{RayRow, scan_map};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::UtcTime;
+use crate::io::utc::DAY_S;
+use crate::io::variable::not_understood;
 use std::path::Path;
 
 /// Gates of which this program knows nothing better overlap by so much, m (samples at 50 MHz).
@@ -21,10 +23,15 @@ struct Header {
     rays: Option<usize>,
     gate_length_m: f64,
     gate_step_m: f64,
-    start: Option<UtcTime>,
+    /// That before the file was opened, from which the hours of rays count.
+    midnight: Option<UtcTime>,
+    /// When the file was opened, s after it.
+    second_of_day: Option<f64>,
+    /// What its date is, if it is none.
+    not_understood: Option<String>,
 }
 
-/// The scans of a text, and what was left out.
+/// The scans of a text.
 pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Found, String> {
     let mut lines = text.lines().enumerate();
     let mut head = Vec::new();
@@ -40,7 +47,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
         .collect();
     let mut rays: Vec<RayRow> = Vec::new();
     let mut intensities: Vec<Vec<f64>> = Vec::new();
-    let mut days_h = 0.0;
+    let mut clock = Clock::new(&header);
     let mut rest = lines.filter(|(_, line)| !line.trim().is_empty());
     while let Some((number, line)) = rest.next() {
         let [hours, azimuth, elevation] = numbers(line)
@@ -51,14 +58,6 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
                 number + 1
             )
         })?;
-        if let Some(before) = rays.last() {
-            // Hours count from midnight.
-            days_h += if 3600.0 * (hours + days_h) < before.time_s - 43_200.0 {
-                24.0
-            } else {
-                0.0
-            };
-        }
         let (mut velocity_m_s, mut intensity) =
             (vec![f64::NAN; header.gates], vec![f64::NAN; header.gates]);
         let ray = rays.len() + 1;
@@ -77,7 +76,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
         rays.push(RayRow {
             elevation_rad: elevation.to_radians(),
             azimuth_rad: azimuth.to_radians(),
-            time_s: 3600.0 * (hours + days_h),
+            time_s: clock.time_s(hours),
             velocity_m_s,
             sigma_m_s: Vec::new(),
         });
@@ -90,22 +89,64 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
         ));
     }
     mask_noise(&mut rays, &intensities, format);
-    let (found, mut left_out) = planes::in_order(rays)?;
-    let mut out = Vec::new();
-    for (sweep, scan) in found.into_iter().enumerate() {
+    let (scans, left_out) = planes::in_order(rays)?;
+    let mut found = Found {
+        left_out,
+        ..Found::default()
+    };
+    for (sweep, scan) in scans.into_iter().enumerate() {
         let what = format!("scan {}", sweep + 1);
         match scan_map(scan.rays, range_m.clone(), None, &what) {
-            Err(reason) => left_out.push(reason),
-            Ok(map) => out.push(ReadScan {
+            Err(reason) => found.left_out.push(reason),
+            Ok(map) => found.scans.push(ReadScan {
                 azimuth_rad: scan.azimuth_rad,
-                reference: header.start,
+                reference: header.midnight,
                 gate_length_m: Some(header.gate_length_m),
                 is_own: head.contains(&crate::io::hpl::SYSTEM_ID),
                 ..ReadScan::new(path, sweep, map)
             }),
         }
     }
-    Ok((out, left_out))
+    found.warnings.extend(header.not_understood);
+    Ok(found)
+}
+
+/// Times of rays from their hours since midnight, which begin anew on the next day.
+struct Clock {
+    /// Whether the date of the file is known, or it has none.
+    is_known: bool,
+    /// Those of the ray before, or of the opening of the file, s since the midnight before it.
+    last_s: Option<f64>,
+    days_s: f64,
+}
+
+impl Clock {
+    fn new(header: &Header) -> Self {
+        Self {
+            is_known: header.not_understood.is_none(),
+            last_s: header.second_of_day,
+            days_s: 0.0,
+        }
+    }
+
+    /// The time of the next ray, s.
+    fn time_s(&mut self, hours: f64) -> f64 {
+        let own_s = 3600.0 * hours;
+        let later_s = self
+            .last_s
+            .map_or(0.0, |last_s| own_s + self.days_s - last_s);
+        if later_s < -0.5 * DAY_S {
+            self.days_s += DAY_S;
+        } else if later_s > 0.5 * DAY_S {
+            // Opened after midnight with a ray of the day before.
+            self.days_s -= DAY_S;
+        }
+        self.last_s = Some(own_s + self.days_s);
+        match self.is_known {
+            true => own_s + self.days_s,
+            false => f64::NAN,
+        }
+    }
 }
 
 impl Header {
@@ -144,22 +185,19 @@ impl Header {
             (true, None) => OVERLAP_STEP_M,
         };
         let rays = number("no. of rays in file").map(|rays| rays.max(0.0) as usize);
-        // YYYYMMDD hh:mm:ss; times of rays count from its midnight.
-        let start = value("start time").and_then(|text| {
-            let day = text.get(..8)?;
-            UtcTime::parse(&format!(
-                "{}-{}-{}T00:00:00Z",
-                day.get(..4)?,
-                day.get(4..6)?,
-                day.get(6..8)?
-            ))
-        });
+        let stated = value("start time");
+        let start = stated.and_then(UtcTime::parse_reference);
+        let second_of_day = start.map(|(start, _)| start.second_of_day() as f64);
         Ok(Self {
             gates,
             rays,
             gate_length_m,
             gate_step_m,
-            start,
+            midnight: start.map(|(start, _)| start.after_s(-(start.second_of_day() as f64))),
+            second_of_day,
+            not_understood: stated
+                .filter(|_| start.is_none())
+                .map(|text| not_understood("Start time", text)),
         })
     }
 }
@@ -235,7 +273,7 @@ mod tests {
     }
 
     fn read(text: &str, format: &ScanFormat) -> ReadScan {
-        let (mut found, _) = scans(text, Path::new("x.hpl"), format).unwrap();
+        let mut found = scans(text, Path::new("x.hpl"), format).unwrap().scans;
         assert_eq!(found.len(), 1);
         found.remove(0)
     }
@@ -268,7 +306,7 @@ mod tests {
         assert!(
             scans(&file(&[]), Path::new("x.hpl"), &loud)
                 .unwrap()
-                .0
+                .scans
                 .is_empty(),
             "0.2 is -7 dB"
         );
@@ -277,6 +315,39 @@ mod tests {
             ..ScanFormat::default()
         };
         assert_eq!(read(&file(&[]), &towards).map.velocity_m_s[[0, 5]], -2.5);
+    }
+
+    #[test]
+    fn hours_belong_to_the_day_of_the_opening_or_to_its_neighbours() {
+        let date = |changes: &[(&str, &str)]| {
+            let found = read(&file(changes), &ScanFormat::default());
+            let first_s = found.map.time_s[0];
+            found.reference.unwrap().after_s(first_s + 0.5).to_string()
+        };
+        assert_eq!(date(&[]), "2024-01-31T23:59:24Z");
+        let opened_before = ("20240131 23:59:00.00", "20240130 23:59:59.50");
+        let after = ("23.99000", "0.00010");
+        assert_eq!(date(&[opened_before, after]), "2024-01-31T00:00:00Z");
+        let opened_after = ("20240131 23:59:00.00", "20240201 0:00:0.5");
+        assert_eq!(date(&[opened_after]), "2024-01-31T23:59:24Z");
+    }
+
+    #[test]
+    fn a_date_that_is_not_understood_is_named_and_gives_no_times() {
+        let text = file(&[("20240131 23:59:00.00", "31.01.2024 23:59")]);
+        let found = scans(&text, Path::new("x.hpl"), &ScanFormat::default()).unwrap();
+        assert!(
+            found.warnings[0].contains("31.01.2024 23:59"),
+            "{:?}",
+            found.warnings
+        );
+        assert!(
+            found.scans[0]
+                .map
+                .time_s
+                .iter()
+                .all(|time_s| time_s.is_nan())
+        );
     }
 
     #[test]

@@ -17,6 +17,7 @@ mod table;
 pub use planes::{are_of_one_plane, face_alike, plane_numbers};
 
 use crate::Error;
+use crate::io::netcdf_input::open_groups;
 use crate::io::{UtcTime, text_file};
 use crate::machine;
 use std::path::{Path, PathBuf};
@@ -109,68 +110,92 @@ impl ReadScan {
     }
 }
 
-/// Scans, and what was left out.
-type Found = (Vec<ReadScan>, Vec<String>);
+/// What is said of a file without a ratio of signal and noise that is to be held against a least one.
+const NO_RATIO: &str = "it has no signal-to-noise ratio, which --min-snr needs: none of its variables is called snr, cnr, \
+                        signal_to_noise_ratio or intensity";
 
-/// Reads the scans of a file; the sweeps that are none are left out, and said in the texts.
+/// What a file or a group of it holds.
+#[derive(Default)]
+struct Found {
+    scans: Vec<ReadScan>,
+    /// Sweeps and rays that are of no use, and why.
+    left_out: Vec<String>,
+    /// What was not understood.
+    warnings: Vec<String>,
+}
+
+/// Reads the scans of a file; the texts say which sweeps are none and left out, and which times were not understood.
 ///
 /// # Errors
-/// A file that cannot be read, is damaged or cut short, has no scan in elevation, or no velocity that is not missing.
-pub fn read(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
+/// A file that cannot be read, is damaged or cut short, has no scan in elevation, or no velocity that is not missing; a variable that
+/// cannot be understood.
+pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<String>), Error> {
+    let (_, length, magic) = text_file::begin(path)?;
+    let found = match &magic[..] {
+        [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => netcdf(path, format)?,
+        _ => text(path, length, format)?,
+    };
+    if found.scans.is_empty() {
+        return Err(Error::Input {
+            path: path.to_owned(),
+            reason: match &found.left_out[..] {
+                [only] => only.clone(),
+                all => format!(
+                    "it has no scan in elevation (RHI) that can be used: {}",
+                    all.join("; ")
+                ),
+            },
+        });
+    }
+    let left_out = found
+        .left_out
+        .iter()
+        .map(|what| format!("{what}: left out"));
+    Ok((found.scans, left_out.chain(found.warnings).collect()))
+}
+
+fn netcdf(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
+    let mut all = Found::default();
+    let groups = open_groups(path, "elevation", cfradial::has_rays)?;
+    for (sweep, group) in groups.into_iter().enumerate() {
+        let found = cfradial::scans(&group, path, format, sweep);
+        let found = found.map_err(|reason| group.refuse(reason))?;
+        all.scans.extend(found.scans);
+        all.left_out.extend(found.left_out);
+        all.warnings.extend(found.warnings);
+    }
+    Ok(all)
+}
+
+fn text(path: &Path, length: u64, format: &ScanFormat) -> Result<Found, Error> {
     let refuse = |reason: String| Error::Input {
         path: path.to_owned(),
         reason,
     };
-    let (_, length, magic) = text_file::begin(path)?;
-    let (scans, left_out) = match &magic[..] {
-        [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
-            let mut all = Found::default();
-            let groups = crate::io::netcdf_input::open_groups(path, "elevation")?;
-            for (sweep, group) in groups.into_iter().enumerate() {
-                let found = cfradial::scans(&group, path, format, sweep);
-                let (scans, left_out) = found.map_err(|reason| group.refuse(reason))?;
-                all.0.extend(scans);
-                all.1.extend(left_out);
-            }
-            all
-        }
-        _ => {
-            if length > LARGEST_TEXT_BYTES {
-                return Err(refuse(format!(
-                    "it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read"
-                )));
-            }
-            let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
-            // The text, and a text of its own for each cell.
-            let cells = bytes
-                .iter()
-                .filter(|byte| matches!(byte, b',' | b'\n' | b' ' | b'\t'))
-                .count();
-            machine::holds("its table", 2.0 * length as f64 + 64.0 * cells as f64)
-                .map_err(refuse)?;
-            // Files of instruments have names of places in all encodings; numbers are the same in each.
-            let text = String::from_utf8_lossy(&bytes);
-            let found = match text
-                .lines()
-                .take(60)
-                .any(|line| line.trim_start().starts_with("****"))
-            {
-                true => hpl::scans(&text, path, format),
-                false => table::scans(&text, path, format),
-            };
-            found.map_err(refuse)?
-        }
-    };
-    if scans.is_empty() {
-        return Err(refuse(match &left_out[..] {
-            [only] => only.clone(),
-            _ => format!(
-                "it has no scan in elevation (RHI) that can be used: {}",
-                left_out.join("; ")
-            ),
-        }));
+    if length > LARGEST_TEXT_BYTES {
+        return Err(refuse(format!(
+            "it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read"
+        )));
     }
-    Ok((scans, left_out))
+    let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
+    // The text, and a text of its own for each cell.
+    let cells = bytes
+        .iter()
+        .filter(|byte| matches!(byte, b',' | b';' | b'\n' | b' ' | b'\t'))
+        .count();
+    machine::holds("its table", 2.0 * length as f64 + 64.0 * cells as f64).map_err(refuse)?;
+    // Files of instruments have names of places in all encodings; numbers are the same in each.
+    let text =
+        text_file::decode(&bytes).unwrap_or_else(|_| String::from_utf8_lossy(&bytes).into_owned());
+    let is_hpl = text
+        .lines()
+        .take(60)
+        .any(|line| line.trim_start().starts_with("****"));
+    match is_hpl {
+        true => hpl::scans(&text, path, format),
+        false => table::scans(&text, path, format),
+    }
+    .map_err(refuse)
 }
 
 /// Largest text that is read \[bytes\].

@@ -5,20 +5,14 @@
 use super::grid::{RayRow, mean_count, of_mean, scan_map};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::csv_input::TextTable;
+use crate::io::netcdf_input::quoted;
+use crate::io::units::Quantity;
+use crate::io::variable::{self, AZIMUTH, Known, RANGE, RATIO, SIGMA, Times, VELOCITY};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Names of the velocity, the first that is there is taken.
-const VELOCITIES: [&str; 4] = [
-    "velocity_m_s",
-    OWN,
-    "radial_velocity_m_s",
-    "radial_velocity",
-];
-/// That of the estimates of this program.
+/// The velocity among the estimates of this program.
 const OWN: &str = "v_mean_m_s";
-/// Names of its standard deviation.
-const SIGMAS: [&str; 3] = ["sigma_m_s", "std_m_s", "predicted_std_m_s"];
 /// Values of an axis that differ by less than this part of its mean step are the same.
 const SAME: f64 = 1e-3;
 
@@ -38,33 +32,41 @@ struct Row {
     count: f64,
 }
 
-/// The scans of a table, and what was left out.
+/// The scans of a table.
 pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Found, String> {
     let table = TextTable::parse(text)?;
     // Programs that write it again keep the names of its columns.
     let is_own =
         table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some();
-    let (rows, skipped) = rows(&table, format, is_own)?;
-    if rows.is_empty() {
+    let Rows {
+        sweeps,
+        times,
+        without_elevation,
+    } = rows(&table, format, is_own)?;
+    if sweeps.is_empty() {
         return Err("it has a header and no rows with an elevation".into());
     }
     let scene_toml = Some(table.origin().scene_toml).filter(|text| !text.is_empty());
-    let (mut out, mut left_out) = (Vec::new(), Vec::new());
-    if skipped > 0 {
+    let mut found = Found::default();
+    if without_elevation > 0 {
         let all = table.rows.len();
-        left_out.push(format!("{skipped} of {all} rows have no elevation"));
+        found.left_out.push(format!(
+            "{without_elevation} of {all} rows have no elevation"
+        ));
     }
-    for (sweep, rows) in rows {
+    for (sweep, rows) in sweeps {
         let (rays, range_m) = grid(&rows)?;
         let what = format!("sweep {sweep}");
-        let (found, skipped) =
+        let (scans, skipped) =
             planes::in_any_order(rays).map_err(|reason| format!("{what}: {reason}"))?;
-        left_out.extend(skipped.iter().map(|text| format!("{what}: {text}")));
-        for scan in found {
+        let skipped = skipped.iter().map(|text| format!("{what}: {text}"));
+        found.left_out.extend(skipped);
+        for scan in scans {
             match scan_map(scan.rays, range_m.clone(), None, &what) {
-                Err(reason) => left_out.push(reason),
-                Ok(map) => out.push(ReadScan {
+                Err(reason) => found.left_out.push(reason),
+                Ok(map) => found.scans.push(ReadScan {
                     azimuth_rad: scan.azimuth_rad,
+                    reference: times.reference,
                     scene_toml: scene_toml.clone(),
                     scans: mean_count(rows.iter().map(|row| row.count)),
                     is_own,
@@ -73,101 +75,132 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
             }
         }
     }
-    Ok((out, left_out))
+    found.warnings.extend(times.not_understood);
+    Ok(found)
 }
 
-/// The rows of each sweep, and the number of rows without an elevation. Numbers of this program's maps have the digits of their NetCDF files, single precision and angles in degrees:
+/// The rows of a table.
+struct Rows {
+    sweeps: BTreeMap<u64, Vec<Row>>,
+    times: Times,
+    without_elevation: usize,
+}
+
+/// The rows of each sweep. Numbers of this program's maps have the digits of their NetCDF files, single precision and angles in degrees:
 /// fits to what jumps tell the same of both.
-fn rows(
-    table: &TextTable,
-    format: &ScanFormat,
-    is_own: bool,
-) -> Result<(BTreeMap<u64, Vec<Row>>, usize), String> {
-    let one_of = |names: &[&str]| names.iter().find_map(|name| table.column(name));
-    let needed = |names: &[&str]| {
-        one_of(names).ok_or_else(|| {
-            format!(
-                "it has no column {}: range_m, elevation_rad (or elevation_deg), velocity_m_s and, if known, time_s and sigma_m_s are read",
-                names.join(" or ")
-            )
-        })
+fn rows(table: &TextTable, format: &ScanFormat, is_own: bool) -> Result<Rows, String> {
+    let missing = |name: &str| {
+        format!(
+            "it has no column {name}: range_m, elevation_rad (or elevation_deg), velocity_m_s and, if known, time_s and sigma_m_s are \
+             read, or other units in their names; it has {}",
+            columns(table)
+        )
     };
     let velocity = match &format.field {
-        Some(name) => needed(&[name])?,
-        None => needed(&VELOCITIES)?,
+        Some(name) => table
+            .column(name)
+            .map(|at| table.header[at].as_str())
+            .ok_or_else(|| {
+                format!(
+                    "it has no column {name}, which --field names; it has {}",
+                    columns(table)
+                )
+            })?,
+        None => variable::find(table, &VELOCITY).ok_or_else(|| missing("velocity_m_s"))?,
     };
-    let elevation = table.angle("elevation").map_or_else(
-        || needed(&["elevation_rad"]).map(|column| (column, 1.0)),
-        Ok,
-    )?;
-    let (range, azimuth, time) = (
-        needed(&["range_m"])?,
-        table.angle("azimuth"),
-        table.column("time_s"),
-    );
-    let (sweep, snr, flagged) = (
-        one_of(&["sweep", "scan"]),
-        table.column("snr_db"),
-        table.column("flagged"),
-    );
-    let is_mean = table.header[velocity] == OWN;
-    let (sigma, count) = (one_of(&SIGMAS), table.column("count").filter(|_| is_mean));
-    let mut out: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
-    let mut skipped = 0;
+    let optional = |known: &Known, quantity| match variable::find(table, known) {
+        Some(name) => variable::values(table, name, quantity).map(Some),
+        None => Ok::<_, String>(None),
+    };
+    let range = variable::find(table, &RANGE).ok_or_else(|| missing("range_m"))?;
+    let ranges_m = variable::values(table, range, Quantity::Length)?;
+    let (elevation, elevations_rad) =
+        variable::elevations_rad(table)?.ok_or_else(|| missing("elevation_rad"))?;
+    let elevation = table.column(elevation).unwrap_or_default();
+    let velocities_m_s = variable::values(table, velocity, Quantity::Velocity)?;
+    let azimuths_rad = optional(&AZIMUTH, Quantity::Angle)?;
+    let sigmas_m_s = optional(&SIGMA, Quantity::Velocity)?;
+    let times = variable::times(table, table.rows.len())?;
+    let ratios_db = match (format.min_snr_db, variable::find(table, &RATIO)) {
+        (None, _) => None,
+        (Some(_), Some(name)) => Some(variable::ratio_db(table, name)?),
+        (Some(_), None) => return Err(super::NO_RATIO.to_owned()),
+    };
+    let is_mean = velocity == OWN;
+    let velocity = table.column(velocity).unwrap_or_default();
+    let sweep = table.column("sweep").or_else(|| table.column("scan"));
+    let flagged = table.column("flagged");
+    let count = table.column("count").filter(|_| is_mean);
+    let mut sweeps: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
+    let mut without_elevation = 0;
     for (row, cells) in table.rows.iter().enumerate() {
         let refuse = |reason: &str| Err(format!("row {}: {reason}", row + 1));
         let number = |column: usize| table.number(row, column);
-        let single = |column: usize| {
+        let single = |value: f64| {
             if is_own {
-                f64::from(number(column) as f32)
+                f64::from(value as f32)
             } else {
-                number(column)
+                value
             }
         };
-        let radians = |(column, unit): (usize, f64)| unit * number(column);
         let sweep = sweep.map_or(0.0, number);
         if !(sweep >= 0.0 && sweep.fract() == 0.0) {
             return refuse("sweep is no whole number");
         }
-        if is_missing(&cells[elevation.0]) {
-            skipped += 1;
+        if is_missing(&cells[elevation]) {
+            without_elevation += 1;
             continue;
         }
-        let (range_m, elevation_rad) = (single(range), radians(elevation));
+        let range_m = single(ranges_m[row]);
+        let elevation_rad = elevations_rad[row];
         if !(range_m.is_finite() && elevation_rad.is_finite()) {
             return refuse("its range or elevation is no number");
         }
-        let velocity_m_s = single(velocity);
+        let velocity_m_s = single(velocities_m_s[row]);
         if velocity_m_s.is_nan() && !is_missing(&cells[velocity]) {
             return refuse("its velocity is no number; an empty cell is a missing one");
         }
-        let is_noise = snr.is_some_and(|c| format.is_noise(number(c)))
+        let is_noise = ratios_db
+            .as_ref()
+            .is_some_and(|ratios_db| format.is_noise(ratios_db[row]))
             || flagged.is_some_and(|c| number(c) > 0.5);
-        out.entry(sweep as u64).or_default().push(Row {
+        sweeps.entry(sweep as u64).or_default().push(Row {
             number: row + 1,
             range_m,
             elevation_rad: match is_own {
                 true => f64::from(elevation_rad.to_degrees() as f32).to_radians(),
                 false => elevation_rad,
             },
-            azimuth_rad: azimuth.map_or(f64::NAN, radians),
-            time_s: time.map_or(f64::NAN, number),
+            azimuth_rad: azimuths_rad.as_ref().map_or(f64::NAN, |all| all[row]),
+            time_s: times.time_s[row],
             velocity_m_s: if is_noise {
                 f64::NAN
             } else {
                 format.sign() * velocity_m_s
             },
-            sigma_m_s: sigma.map(|column| of_mean(single(column), count.map(number))),
+            sigma_m_s: sigmas_m_s
+                .as_ref()
+                .map(|all| of_mean(single(all[row]), count.map(number))),
             count: count.map_or(f64::NAN, number),
         });
     }
-    Ok((out, skipped))
+    Ok(Rows {
+        sweeps,
+        times,
+        without_elevation,
+    })
 }
 
 /// Whether a cell says that there is no number.
 fn is_missing(cell: &str) -> bool {
     let text = cell.trim();
     text.is_empty() || text.eq_ignore_ascii_case("nan")
+}
+
+/// The names of the first columns of a table.
+fn columns(table: &TextTable) -> String {
+    let names = table.header.iter().take(8).map(|name| quoted(name));
+    names.collect::<Vec<_>>().join(", ")
 }
 
 /// The rays of one sweep on the ranges of all, in the order in which they first come.

@@ -231,7 +231,7 @@ fn of_samples<S: Sample>(
     options: &RecordedOptions,
     observer: &dyn Observer,
 ) -> Result<Recorded, Error> {
-    let largest = largest_part(plan, records)?;
+    let largest = largest_part(plan, is_own, records, observer)?;
     // Numbers that are scaled are not those of the scene any more, and another noise gives another map.
     let is_own = is_own && records.whole_scale() == 1.0;
     let noise = options.noise.unwrap_or(if is_own {
@@ -333,28 +333,70 @@ pub(crate) fn samples<S: Sample>(
         .map_err(|_| records.refuse("it became shorter".into()))
 }
 
-/// The largest part of all samples, the outsized ones left out from here on; refuses records without any, and codes that the
-/// scene's converter does not have.
-fn largest_part(plan: &Plan, records: &mut RawRecords) -> Result<f64, Error> {
-    let (mut sizes, mut any) = (SampleSizes::default(), false);
-    for piece in pieces(0..records.records, records.samples) {
-        for sample in records
-            .read(piece)?
-            .into_iter()
-            .filter(|sample| sample.is_finite())
-        {
-            any = true;
-            sizes.add(sample.largest_part());
+/// Sizes and means of the samples of a file.
+#[derive(Default)]
+struct Survey {
+    sizes: SampleSizes,
+    any: bool,
+    /// Mean of the first parts of the samples of each record that has some.
+    means: Vec<f64>,
+}
+
+impl Survey {
+    fn of(records: &mut RawRecords) -> Result<Self, Error> {
+        let mut out = Self::default();
+        for piece in pieces(0..records.records, records.samples) {
+            for record in records.read(piece)?.chunks(records.samples) {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for sample in record.iter().filter(|sample| sample.is_finite()) {
+                    out.any = true;
+                    out.sizes.add(sample.largest_part());
+                    sum += sample.re;
+                    count += 1.0;
+                }
+                if count > 0.0 {
+                    out.means.push(sum / count);
+                }
+            }
         }
+        Ok(out)
     }
-    let outsized = if records.are_integers {
-        f64::INFINITY
-    } else {
-        sizes.outsized()
+}
+
+/// Fewest records that show whether their mean is none of chance.
+const FEWEST_RECORDS: usize = 16;
+/// Standard errors by which the mean of so many records is beyond chance (Student's distribution, once in 10^8).
+const SURE: f64 = 12.0;
+
+/// The offset of a converter: the mean of the records, where it is far beyond what their scatter leaves to chance.
+fn constant_offset(means: &[f64]) -> Option<f64> {
+    if means.len() < FEWEST_RECORDS {
+        return None;
+    }
+    let count = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / count;
+    let square_sum: f64 = means.iter().map(|own| (own - mean).powi(2)).sum();
+    let standard_error = (square_sum / (count * (count - 1.0))).sqrt();
+    (mean.abs() > SURE * standard_error).then_some(mean)
+}
+
+/// The largest part of all samples, the outsized ones left out from here on; refuses records without any, and codes that the
+/// scene's converter does not have. A constant offset of real samples of an instrument is subtracted from here on, as no frequency of
+/// the band is 0; about 0 Hz, where complex samples have their band, it cannot be told from an echo.
+fn largest_part(
+    plan: &Plan,
+    is_own: bool,
+    records: &mut RawRecords,
+    observer: &dyn Observer,
+) -> Result<f64, Error> {
+    let survey = Survey::of(records)?;
+    let outsized = |records: &RawRecords, sizes: &SampleSizes| match records.are_integers {
+        true => f64::INFINITY,
+        false => sizes.outsized(),
     };
-    records.outsized = outsized;
-    let largest = sizes.largest_below(outsized);
-    if !any {
+    records.outsized = outsized(records, &survey.sizes);
+    let largest = survey.sizes.largest_below(records.outsized);
+    if !survey.any {
         return Err(
             records.refuse("all of its samples are missing: none is a finite number".into())
         );
@@ -371,5 +413,20 @@ fn largest_part(plan: &Plan, records: &mut RawRecords) -> Result<f64, Error> {
             largest / records.whole_scale()
         )));
     }
-    Ok(largest)
+    let offset = match is_own || records.is_complex {
+        true => None,
+        false => constant_offset(&survey.means),
+    };
+    let Some(offset) = offset else {
+        return Ok(largest);
+    };
+    let path = records.path.display();
+    observer.warn(&format!(
+        "{path}: the mean of its samples is {offset:.4e}, which no echo makes: it is subtracted"
+    ));
+    records.zero += offset / records.scale;
+    records.outsized = f64::INFINITY;
+    let sizes = Survey::of(records)?.sizes;
+    records.outsized = outsized(records, &sizes);
+    Ok(sizes.largest_below(records.outsized))
 }

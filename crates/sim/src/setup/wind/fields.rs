@@ -136,9 +136,15 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
     for path in files(&path).map_err(of_key)? {
         all.extend(places(&path, &flow.names[0]).map_err(of_key)?);
     }
+    // Files may count from dates of their own.
+    let start = all.first().and_then(|field| field.reference);
+    let later_s = |field: &FieldPlace| match (start, field.reference) {
+        (Some(start), Some(own)) => own.seconds_since(start),
+        _ => 0.0,
+    };
     let times_s: Vec<f64> = all
         .iter()
-        .map(|f| f.time_s * flow.length_unit_m / flow.velocity_unit_m_s)
+        .map(|f| f.time_s * flow.length_unit_m / flow.velocity_unit_m_s + later_s(f))
         .collect();
     let (Some(&first_s), Some(&last_s)) = (times_s.first(), times_s.last()) else {
         return Err(refuse("no field at all".into()));

@@ -1,0 +1,555 @@
+//! Variables of measurements in SI, whichever file has them: their names, their units, and what stands beside them for each ray or
+//! sweep.
+//!
+//! A file is a [`Source`]: NetCDF, whose numbers come unpacked, or a table, whose columns have their units in their names. Variables
+//! are found by the names of CfRadial, Windcube, HALO and level-1 files or by their standard names, and what cannot be understood is an
+//! error with the name and the attributes of the variable. Check: each unit and each spelling of a quantity gives the same
+//! values; what is ambiguous is refused.
+
+use super::UtcTime;
+use super::csv_input::TextTable;
+use super::netcdf_input::{NetcdfFile, quoted};
+use super::units::{Quantity, split_date};
+use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
+
+/// A file with named variables.
+pub(crate) trait Source {
+    /// Whether a length without a unit is in metres and an angle in degrees, as in CfRadial.
+    const HAS_USUAL_UNITS: bool;
+    /// Names of all variables.
+    fn names(&self) -> Vec<&str>;
+    /// A text attribute of a variable.
+    fn attribute(&self, variable: &str, name: &str) -> Option<&str>;
+    /// The unpacked numbers of a variable; NaN where one is missing.
+    ///
+    /// # Errors
+    /// A variable that cannot be read or is not made of numbers.
+    fn numbers(&self, name: &str) -> Result<Vec<f64>, String>;
+    /// The texts of a variable.
+    ///
+    /// # Errors
+    /// A variable that is not made of texts.
+    fn texts(&self, name: &str) -> Result<Vec<String>, String>;
+    /// A text of this name beside the variables.
+    fn named_text(&self, name: &str) -> Option<String>;
+}
+
+impl Source for NetcdfFile {
+    const HAS_USUAL_UNITS: bool = true;
+
+    fn names(&self) -> Vec<&str> {
+        NetcdfFile::names(self).collect()
+    }
+
+    fn attribute(&self, variable: &str, name: &str) -> Option<&str> {
+        self.text(variable, name)
+    }
+
+    fn numbers(&self, name: &str) -> Result<Vec<f64>, String> {
+        self.floats(name)
+    }
+
+    fn texts(&self, name: &str) -> Result<Vec<String>, String> {
+        NetcdfFile::texts(self, name)
+    }
+
+    fn named_text(&self, name: &str) -> Option<String> {
+        NetcdfFile::named_text(self, name)
+    }
+}
+
+impl Source for TextTable {
+    const HAS_USUAL_UNITS: bool = false;
+
+    fn names(&self) -> Vec<&str> {
+        self.header.iter().map(String::as_str).collect()
+    }
+
+    fn attribute(&self, _: &str, _: &str) -> Option<&str> {
+        None
+    }
+
+    fn numbers(&self, name: &str) -> Result<Vec<f64>, String> {
+        let column = self.column(name);
+        let column = column.ok_or_else(|| format!("it has no column {name}"))?;
+        Ok((0..self.rows.len())
+            .map(|row| self.number(row, column))
+            .collect())
+    }
+
+    fn texts(&self, name: &str) -> Result<Vec<String>, String> {
+        let column = self.column(name);
+        let column = column.ok_or_else(|| format!("it has no column {name}"))?;
+        let is_text = |row: usize| {
+            let cell = self.rows[row][column].trim();
+            !cell.is_empty()
+                && self.number(row, column).is_nan()
+                && !cell.eq_ignore_ascii_case("nan")
+        };
+        match (0..self.rows.len()).any(is_text) {
+            true => Ok(self
+                .rows
+                .iter()
+                .map(|cells| cells[column].clone())
+                .collect()),
+            false => Err(format!("column {name} has no texts")),
+        }
+    }
+
+    fn named_text(&self, _: &str) -> Option<String> {
+        None
+    }
+}
+
+/// The names of one variable.
+pub(crate) struct Known {
+    /// Words between blanks, the preferred one first; small and capital letters are alike.
+    names: &'static str,
+    standard_names: &'static [&'static str],
+}
+
+pub(crate) const AWAY: &str = "radial_velocity_of_scatterers_away_from_instrument";
+pub(crate) const TOWARDS: &str = "radial_velocity_of_scatterers_toward_instrument";
+
+/// Radial velocities, positive away unless the standard name says otherwise.
+pub(crate) const VELOCITY: Known = Known {
+    names: "radial_velocity velocity v_mean radial_wind_speed vel vr vrad vradh doppler_velocity mean_doppler_velocity dv v_raw",
+    standard_names: &[AWAY, TOWARDS],
+};
+/// Standard deviations of radial velocities.
+pub(crate) const SIGMA: Known = Known {
+    names: "velocity_standard_deviation sigma std predicted_std radial_velocity_error velocity_error errdv radial_velocity_std",
+    standard_names: &[
+        "radial_velocity_of_scatterers_away_from_instrument standard_error",
+        "radial_velocity_of_scatterers_toward_instrument standard_error",
+    ],
+};
+/// Ratios of signal and noise.
+pub(crate) const RATIO: Known = Known {
+    names: "signal_to_noise_ratio snr cnr carrier_to_noise_ratio intensity signal_to_noise_ratio_plus_one snr_plus_one",
+    standard_names: &["signal_to_noise_ratio"],
+};
+pub(crate) const RANGE: Known = Known {
+    names: "range distance slant_range",
+    standard_names: &["projection_range_coordinate"],
+};
+pub(crate) const ELEVATION: Known = Known {
+    names: "elevation elevation_angle ele elev",
+    standard_names: &[
+        "ray_elevation_angle",
+        "sensor_elevation_angle",
+        "beam_elevation_angle",
+    ],
+};
+/// Angles from the zenith, where a file has no elevations.
+pub(crate) const ZENITH: Known = Known {
+    names: "zenith zenith_angle",
+    standard_names: &["zenith_angle", "sensor_zenith_angle"],
+};
+pub(crate) const AZIMUTH: Known = Known {
+    names: "azimuth azimuth_angle azi",
+    standard_names: &[
+        "ray_azimuth_angle",
+        "sensor_azimuth_angle",
+        "beam_azimuth_angle",
+    ],
+};
+pub(crate) const TIME: Known = Known {
+    names: "time timestamp",
+    standard_names: &["time"],
+};
+/// The largest velocity that can be told apart.
+pub(crate) const NYQUIST: Known = Known {
+    names: "nyquist_velocity nyquist nyquist_vel nqv unambiguous_velocity",
+    standard_names: &[],
+};
+/// 1 for rays while the head moves to the place of another scan.
+pub(crate) const TRANSITION: Known = Known {
+    names: "antenna_transition",
+    standard_names: &[],
+};
+pub(crate) const PULSE_WIDTH: Known = Known {
+    names: "pulse_width pulse_duration",
+    standard_names: &[],
+};
+
+/// The variable of a file that is known by one of these names.
+pub(crate) fn find<'s>(source: &'s impl Source, known: &Known) -> Option<&'s str> {
+    let names = source.names();
+    let exact = |wanted: &str| names.iter().find(|name| **name == wanted);
+    let of_letters = |wanted: &str| names.iter().find(|name| name.eq_ignore_ascii_case(wanted));
+    let of_column = |wanted: &str| {
+        let is_same = |name: &&&str| split_unit(name).0.eq_ignore_ascii_case(wanted);
+        names.iter().find(is_same)
+    };
+    let by_name = known.names.split(' ').find_map(|wanted| {
+        exact(wanted)
+            .or_else(|| of_letters(wanted))
+            .or_else(|| of_column(wanted))
+    });
+    let is_standard = |name: &&&str| {
+        let own = source.attribute(name, "standard_name").unwrap_or_default();
+        known.standard_names.contains(&own)
+    };
+    by_name.or_else(|| names.iter().find(is_standard)).copied()
+}
+
+/// Units behind the names of columns, the longer ones first.
+const UNITS_OF_NAMES: [(&str, &str); 16] = [
+    ("_cm_s", "cm s-1"),
+    ("_km_h", "km h-1"),
+    ("_m_s", "m s-1"),
+    ("_degrees", "degrees"),
+    ("_deg", "degrees"),
+    ("_rad", "rad"),
+    ("_seconds", "s"),
+    ("_hours", "hours"),
+    ("_ms", "ms"),
+    ("_db", "dB"),
+    ("_km", "km"),
+    ("_cm", "cm"),
+    ("_kt", "kt"),
+    ("_m", "m"),
+    ("_s", "s"),
+    ("_h", "hours"),
+];
+
+/// The name of a column without its unit, and the unit: `range_km`, `range (km)` or `range [km]`.
+fn split_unit(column: &str) -> (&str, Option<&str>) {
+    let column = column.trim();
+    for (open, close) in [('(', ')'), ('[', ']')] {
+        if let Some((name, unit)) = column.strip_suffix(close).and_then(|c| c.rsplit_once(open)) {
+            return (name.trim_end(), Some(unit.trim()));
+        }
+    }
+    for (suffix, unit) in UNITS_OF_NAMES {
+        let Some(at) = column.len().checked_sub(suffix.len()) else {
+            continue;
+        };
+        let is_there = column
+            .get(at..)
+            .is_some_and(|end| end.eq_ignore_ascii_case(suffix));
+        if is_there && at > 0 {
+            return (&column[..at], Some(unit));
+        }
+    }
+    (column, None)
+}
+
+/// The unit of a variable: its attribute, or what its name ends with.
+fn units<'s>(source: &'s impl Source, name: &'s str) -> Option<&'s str> {
+    let stated = source
+        .attribute(name, "units")
+        .filter(|units| !units.trim().is_empty());
+    stated.or_else(|| split_unit(name).1)
+}
+
+/// The values of a variable in SI; NaN where one is missing.
+///
+/// # Errors
+/// A variable that cannot be read; a unit of another quantity, with the name and what is allowed.
+pub(crate) fn values<S: Source>(
+    source: &S,
+    name: &str,
+    quantity: Quantity,
+) -> Result<Vec<f64>, String> {
+    let units = units(source, name).unwrap_or_default();
+    let is_ambiguous = matches!(quantity, Quantity::Length | Quantity::Angle);
+    if units.is_empty() && is_ambiguous && !S::HAS_USUAL_UNITS {
+        return Err(format!(
+            "column {name} has no unit in its name, such as {name}_{}",
+            if quantity == Quantity::Angle {
+                "deg"
+            } else {
+                "m"
+            }
+        ));
+    }
+    let unit = quantity
+        .si(units)
+        .map_err(|needed| format!("{} has units = {}: {needed}", shown(name), quoted(units)))?;
+    let mut values = source.numbers(name)?;
+    if unit != 1.0 {
+        values.iter_mut().for_each(|value| *value *= unit);
+    }
+    Ok(values)
+}
+
+fn shown(name: &str) -> String {
+    format!("variable {}", quoted(name).trim_matches('"'))
+}
+
+/// Elevations of the rays, rad, with the name of their variable: of the zenith angle in a file without elevations, none in a file with
+/// neither.
+///
+/// # Errors
+/// As [`values`].
+pub(crate) fn elevations_rad(source: &impl Source) -> Result<Option<(&str, Vec<f64>)>, String> {
+    if let Some(name) = find(source, &ELEVATION) {
+        return Ok(Some((name, values(source, name, Quantity::Angle)?)));
+    }
+    let Some(name) = find(source, &ZENITH) else {
+        return Ok(None);
+    };
+    let mut angles_rad = values(source, name, Quantity::Angle)?;
+    angles_rad
+        .iter_mut()
+        .for_each(|angle_rad| *angle_rad = FRAC_PI_2 - *angle_rad);
+    Ok(Some((name, angles_rad)))
+}
+
+/// A value for each ray, from a variable that has one for each ray, for each sweep, or for all.
+///
+/// # Errors
+/// Another number of values.
+pub(crate) fn of_rays(
+    name: &str,
+    values: Vec<f64>,
+    rays: usize,
+    sweeps: &[Range<usize>],
+) -> Result<Vec<f64>, String> {
+    if values.len() == rays {
+        return Ok(values);
+    }
+    if let [one] = values[..] {
+        return Ok(vec![one; rays]);
+    }
+    if values.len() != sweeps.len() {
+        return Err(format!(
+            "{} has {} values; one for each of {rays} rays, for each of {} sweeps or for all is needed",
+            shown(name),
+            values.len(),
+            sweeps.len()
+        ));
+    }
+    let mut out = vec![f64::NAN; rays];
+    for (sweep, value) in sweeps.iter().zip(values) {
+        out[sweep.clone()].fill(value);
+    }
+    Ok(out)
+}
+
+/// How a ratio of signal and noise is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum RatioForm {
+    Decibel,
+    Linear,
+}
+
+/// The signal-to-noise ratio of a variable in dB, whether it is stored in dB, as a ratio or as a ratio plus 1, which HALO calls
+/// intensity; NaN where it is missing or not above 0.
+///
+/// # Errors
+/// A variable that cannot be read; a unit that is neither; one without a unit whose values do not say which they are.
+pub(crate) fn ratio_db(source: &impl Source, name: &str) -> Result<Vec<f64>, String> {
+    let stored = source.numbers(name)?;
+    let units = units(source, name).unwrap_or_default();
+    let is_plus_one = is_plus_one(source, name);
+    let form = match units.trim().to_ascii_lowercase().as_str() {
+        "db" | "decibel" | "decibels" => RatioForm::Decibel,
+        "1" | "-" | "unitless" | "dimensionless" | "none" | "linear" | "ratio" => RatioForm::Linear,
+        "" if is_plus_one => RatioForm::Linear,
+        // No ratio, and none plus 1, is far below 0.
+        "" if stored.iter().any(|value| *value < -1.0) => RatioForm::Decibel,
+        _ => {
+            return Err(format!(
+                "{} has units = {}: a ratio of signal and noise needs dB, or 1 for a plain ratio",
+                shown(name),
+                quoted(units)
+            ));
+        }
+    };
+    let mut linear = stored;
+    if form == RatioForm::Decibel {
+        if !is_plus_one {
+            return Ok(linear);
+        }
+        linear
+            .iter_mut()
+            .for_each(|value| *value = 10f64.powf(0.1 * *value));
+    }
+    if is_plus_one {
+        check_plus_one(name, &linear)?;
+        linear.iter_mut().for_each(|value| *value -= 1.0);
+    }
+    Ok(linear.into_iter().map(decibels).collect())
+}
+
+/// A ratio in dB; NaN where it is not above 0.
+pub(crate) fn decibels(ratio: f64) -> f64 {
+    match ratio > 0.0 {
+        true => 10.0 * ratio.log10(),
+        false => f64::NAN,
+    }
+}
+
+/// Whether a variable is a ratio of signal and noise plus 1: by its name, or by the words of its attributes.
+fn is_plus_one(source: &impl Source, name: &str) -> bool {
+    let words = [
+        "long_name",
+        "standard_name",
+        "comment",
+        "description",
+        "units",
+    ];
+    let texts = words.iter().filter_map(|word| source.attribute(name, word));
+    let says_so = |text: &str| {
+        let plain: String = text
+            .to_ascii_lowercase()
+            .chars()
+            .filter(|c| c.is_ascii_alphanumeric() || *c == '+')
+            .collect();
+        ["ratio+1", "snr+1", "1+snr", "cnr+1", "plus1", "plusone"]
+            .iter()
+            .any(|form| plain.contains(form))
+    };
+    split_unit(name).0.eq_ignore_ascii_case("intensity")
+        || says_so(name)
+        || texts.into_iter().any(says_so)
+}
+
+/// Noise alone has a ratio plus 1 of about 1: where most are far below, the variable is something else.
+fn check_plus_one(name: &str, values: &[f64]) -> Result<(), String> {
+    let known = values.iter().filter(|value| value.is_finite()).count();
+    let low = values.iter().filter(|value| **value < 0.5).count();
+    match 2 * low > known {
+        true => Err(format!(
+            "{} should be a ratio of signal and noise plus 1, but most of its values are below 0.5",
+            shown(name)
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Times of rays.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Times {
+    /// Seconds after `reference`, or after what the file does not say; NaN if unknown.
+    pub(crate) time_s: Vec<f64>,
+    /// The date from which they count.
+    pub(crate) reference: Option<UtcTime>,
+    /// What of them was not understood.
+    pub(crate) not_understood: Option<String>,
+}
+
+impl Times {
+    fn unknown(count: usize, not_understood: Option<String>) -> Self {
+        Self {
+            time_s: vec![f64::NAN; count],
+            reference: None,
+            not_understood,
+        }
+    }
+
+    /// Times after a date; the reference is moved to the first of those that count from centuries ago.
+    fn after((mut reference, fraction_s): (UtcTime, f64), mut time_s: Vec<f64>) -> Self {
+        let first_s = time_s.iter().copied().find(|time_s| time_s.is_finite());
+        if let Some(far_s) = first_s.filter(|first_s| first_s.abs() > FAR_S) {
+            reference = reference.after_s(far_s);
+            time_s
+                .iter_mut()
+                .for_each(|time_s| *time_s -= far_s.floor());
+        }
+        if fraction_s != 0.0 {
+            time_s.iter_mut().for_each(|time_s| *time_s += fraction_s);
+        }
+        Self {
+            time_s,
+            reference: Some(reference),
+            not_understood: None,
+        }
+    }
+}
+
+/// Seconds of some hundred years, which are counted from a later date.
+const FAR_S: f64 = 4e9;
+
+/// The times of `count` rays; unknown ones where the file has none or says them in words that are not understood.
+///
+/// # Errors
+/// A variable that cannot be read, or has another number of values.
+pub(crate) fn times(source: &impl Source, count: usize) -> Result<Times, String> {
+    let Some(name) = find(source, &TIME) else {
+        return Ok(Times::unknown(count, None));
+    };
+    let found = match source.texts(name) {
+        Ok(texts) => times_of_texts(name, &texts),
+        Err(_) => times_of_numbers(source, name)?,
+    };
+    match found.time_s.len() {
+        own if own == count => Ok(found),
+        own => Err(format!(
+            "{name} has {own} values; one for each of {count} rays is needed"
+        )),
+    }
+}
+
+fn times_of_texts(name: &str, texts: &[String]) -> Times {
+    let dates: Vec<Option<(UtcTime, f64)>> = texts
+        .iter()
+        .map(|text| UtcTime::parse_reference(text))
+        .collect();
+    let Some(first) = dates.iter().flatten().next().copied() else {
+        let found = texts.first().map_or("", String::as_str);
+        return Times::unknown(texts.len(), Some(not_understood(name, found)));
+    };
+    let after = |date: &Option<(UtcTime, f64)>| {
+        date.map_or(f64::NAN, |(date, fraction_s)| {
+            date.seconds_since(first.0) + fraction_s
+        })
+    };
+    Times::after((first.0, 0.0), dates.iter().map(after).collect())
+}
+
+fn times_of_numbers(source: &impl Source, name: &str) -> Result<Times, String> {
+    let numbers = source.numbers(name)?;
+    let units = units(source, name).unwrap_or_default();
+    let (unit, date) = split_date(units);
+    // Plain numbers are taken for seconds.
+    let unit_s = match unit {
+        "1" => Ok(1.0),
+        unit => Quantity::Time.si(unit),
+    };
+    let reference = reference(source, name);
+    let (Ok(unit_s), true) = (unit_s, date.is_none() || reference.is_some()) else {
+        let calendar = source.attribute(name, "calendar").unwrap_or_default();
+        let said = format!("{units} {calendar}");
+        let why = not_understood(name, said.trim());
+        return Ok(Times::unknown(numbers.len(), Some(why)));
+    };
+    let time_s: Vec<f64> = numbers.into_iter().map(|number| number * unit_s).collect();
+    Ok(match reference {
+        Some(reference) => Times::after(reference, time_s),
+        None => Times {
+            time_s,
+            reference: None,
+            not_understood: None,
+        },
+    })
+}
+
+/// The date from which a variable counts time, with the fraction of a second beyond it: that in its units, or that of a text of the file
+/// whose name stands there.
+pub(crate) fn reference(source: &impl Source, name: &str) -> Option<(UtcTime, f64)> {
+    let calendar = source.attribute(name, "calendar").unwrap_or_default();
+    let is_civil = ["", "standard", "gregorian", "proleptic_gregorian"]
+        .contains(&calendar.to_ascii_lowercase().as_str());
+    let (_, date) = split_date(units(source, name)?);
+    let date = date.filter(|_| is_civil)?;
+    UtcTime::parse_reference(date).or_else(|| UtcTime::parse_reference(&source.named_text(date)?))
+}
+
+/// What is said of times that are not understood.
+pub(crate) fn not_understood(name: &str, text: &str) -> String {
+    format!(
+        "its times are not understood ({name}: {}), so that its scans have none and are in no track: a date such as \"seconds since {}\" \
+         is needed",
+        quoted(text),
+        UtcTime::FORM
+    )
+}
+
+#[cfg(test)]
+#[path = "variable_tests.rs"]
+mod tests;

@@ -1,0 +1,233 @@
+use super::*;
+use std::collections::BTreeMap;
+
+/// Variables with their attributes, and their numbers or texts.
+#[derive(Default)]
+struct Given {
+    variables: BTreeMap<&'static str, (Vec<(&'static str, &'static str)>, Values)>,
+    texts: Vec<(&'static str, &'static str)>,
+}
+
+enum Values {
+    Numbers(Vec<f64>),
+    Texts(Vec<&'static str>),
+}
+
+impl Given {
+    fn numbers(
+        name: &'static str,
+        attributes: &[(&'static str, &'static str)],
+        values: &[f64],
+    ) -> Self {
+        let mut out = Self::default();
+        let values = Values::Numbers(values.to_vec());
+        out.variables.insert(name, (attributes.to_vec(), values));
+        out
+    }
+}
+
+impl Source for Given {
+    const HAS_USUAL_UNITS: bool = true;
+
+    fn names(&self) -> Vec<&str> {
+        self.variables.keys().copied().collect()
+    }
+
+    fn attribute(&self, variable: &str, name: &str) -> Option<&str> {
+        let (attributes, _) = self.variables.get(variable)?;
+        let own = attributes.iter().find(|(own, _)| *own == name);
+        own.map(|(_, text)| *text)
+    }
+
+    fn numbers(&self, name: &str) -> Result<Vec<f64>, String> {
+        match &self.variables[name].1 {
+            Values::Numbers(values) => Ok(values.clone()),
+            Values::Texts(_) => Err("no numbers".into()),
+        }
+    }
+
+    fn texts(&self, name: &str) -> Result<Vec<String>, String> {
+        match &self.variables[name].1 {
+            Values::Numbers(_) => Err("no texts".into()),
+            Values::Texts(texts) => Ok(texts.iter().map(|text| (*text).to_owned()).collect()),
+        }
+    }
+
+    fn named_text(&self, name: &str) -> Option<String> {
+        let own = self.texts.iter().find(|(own, _)| *own == name);
+        own.map(|(_, text)| (*text).to_owned())
+    }
+}
+
+fn table(text: &str) -> TextTable {
+    TextTable::parse(text).unwrap()
+}
+
+#[test]
+fn units_come_from_the_attribute_or_from_the_name() {
+    for (name, units, stored) in [
+        ("VEL", "m s-1", 5.0),
+        ("VEL", "cm/s", 500.0),
+        ("velocity_m_s", "", 5.0),
+        ("velocity_km_h", "", 18.0),
+        ("velocity_cm_s", "m/s", 5.0),
+    ] {
+        let file = Given::numbers(name, &[("units", units)], &[stored]);
+        let name = find(&file, &VELOCITY).unwrap();
+        let found = values(&file, name, Quantity::Velocity).unwrap();
+        assert!((found[0] - 5.0).abs() < 1e-12, "{name} {units}: {found:?}");
+    }
+    let radar = Given::numbers("VEL", &[("units", "dBZ")], &[5.0]);
+    let refused = values(&radar, "VEL", Quantity::Velocity).unwrap_err();
+    assert!(
+        refused.contains("variable VEL has units = \"dBZ\""),
+        "{refused}"
+    );
+    for header in ["range_km", "Range (km)", "RANGE [km]"] {
+        let table = table(&format!("{header},b\n0.4,1\n"));
+        let name = find(&table, &RANGE).unwrap();
+        assert_eq!(values(&table, name, Quantity::Length), Ok(vec![400.0]));
+    }
+    let plain = table("elevation,b\n0.4,1\n");
+    let refused = values(&plain, "elevation", Quantity::Angle).unwrap_err();
+    assert!(refused.contains("elevation_deg"), "{refused}");
+}
+
+#[test]
+fn variables_are_found_by_their_names_and_standard_names() {
+    for name in [
+        "radial_wind_speed",
+        "VRADH",
+        "Doppler_Velocity",
+        "dv",
+        "v_mean_m_s",
+    ] {
+        assert_eq!(find(&Given::numbers(name, &[], &[]), &VELOCITY), Some(name));
+    }
+    let standard = Given::numbers("x", &[("standard_name", TOWARDS)], &[]);
+    assert_eq!(find(&standard, &VELOCITY), Some("x"));
+    let error = format!("{AWAY} standard_error");
+    let error = Given::numbers("x", &[("standard_name", error.leak())], &[]);
+    assert_eq!(find(&error, &VELOCITY), None);
+    assert_eq!(find(&error, &SIGMA), Some("x"));
+    let zenith = Given::numbers("zenith", &[("units", "degree")], &[80.0]);
+    let (name, elevation_rad) = elevations_rad(&zenith).unwrap().unwrap();
+    assert_eq!(name, "zenith");
+    assert!((elevation_rad[0] - 10f64.to_radians()).abs() < 1e-12);
+}
+
+#[test]
+fn ratios_are_the_same_in_decibel_as_ratio_and_as_ratio_plus_one() {
+    let decibel = [-13.0, -10.0, 3.0];
+    let linear = decibel.map(|db: f64| 10f64.powf(0.1 * db));
+    let plus_one = linear.map(|ratio| ratio + 1.0);
+    let loud = plus_one.map(|ratio| 10.0 * ratio.log10());
+    for (name, attributes, stored) in [
+        ("snr", &[("units", "dB")][..], decibel),
+        ("snr_db", &[], decibel),
+        ("CNR", &[], decibel),
+        ("SNR", &[("units", "1")], linear),
+        ("cnr", &[("units", "unitless")], linear),
+        ("intensity", &[("units", "unitless")], plus_one),
+        ("Intensity", &[], plus_one),
+        ("intensity", &[("units", "dB")], loud),
+        (
+            "snr",
+            &[("units", "1"), ("long_name", "Signal to noise ratio + 1")],
+            plus_one,
+        ),
+    ] {
+        let file = Given::numbers(name, attributes, &stored);
+        let found = ratio_db(&file, find(&file, &RATIO).unwrap()).unwrap();
+        let is_close = found.iter().zip(decibel).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(is_close, "{name} {attributes:?}: {found:?}");
+    }
+    for (name, units, stored) in [
+        ("snr", "dBZ", [3.0; 3]),
+        ("snr", "", [0.2; 3]),
+        ("snr", "m s-1", [0.2; 3]),
+        ("intensity", "1", [0.01; 3]),
+    ] {
+        let refused = ratio_db(&Given::numbers(name, &[("units", units)], &stored), name);
+        assert!(
+            refused.as_ref().is_err_and(|e| e.contains(name)),
+            "{refused:?}"
+        );
+    }
+    let below = Given::numbers("snr", &[("units", "1")], &[-0.01, 1.0]);
+    let found = ratio_db(&below, "snr").unwrap();
+    assert!(found[0].is_nan() && found[1] == 0.0);
+}
+
+#[test]
+fn companions_are_of_rays_of_sweeps_or_of_all() {
+    let sweeps = [0..2, 2..5];
+    let spread = |values: Vec<f64>| of_rays("nyquist_velocity", values, 5, &sweeps);
+    assert_eq!(spread(vec![8.0]), Ok(vec![8.0; 5]));
+    assert_eq!(spread(vec![8.0, 9.0]), Ok(vec![8.0, 8.0, 9.0, 9.0, 9.0]));
+    let own = vec![1.0, 2.0, 3.0, 4.0, 5.0];
+    assert_eq!(spread(own.clone()), Ok(own));
+    assert!(
+        spread(vec![1.0; 3])
+            .unwrap_err()
+            .contains("nyquist_velocity has 3 values")
+    );
+}
+
+#[test]
+fn times_count_from_any_date_of_the_file() {
+    let first = |times: &Times| {
+        times
+            .reference
+            .unwrap()
+            .after_s(times.time_s[0])
+            .to_string()
+    };
+    for (units, stored) in [
+        ("seconds since 2024-01-31T12:00:00Z", 60.0),
+        ("minutes since 2024-1-31 14:00:0.0 +02:00", 1.0),
+        ("Hours Since 2024-01-31 00:01:00", 12.0),
+        ("s since 2024-01-31 12:00:59.500", 0.5),
+        ("milliseconds since 2024-01-31 12:01", 0.0),
+        ("days since 1-1-1", 738_915.0 + 721.0 / 1440.0),
+        ("seconds since time_reference", 60.0),
+    ] {
+        let mut file = Given::numbers("time", &[("units", units)], &[stored]);
+        file.texts.push(("time_reference", "2024-01-31T12:00:00Z"));
+        let found = times(&file, 1).unwrap();
+        assert_eq!(found.not_understood, None, "{units}");
+        // A day of a thousand years is known to a millisecond.
+        let almost = Times {
+            time_s: vec![found.time_s[0] + 1e-3],
+            ..found
+        };
+        assert_eq!(first(&almost), "2024-01-31T12:01:00Z", "{units}");
+    }
+    let mut dates = Given::default();
+    let texts = Values::Texts(vec!["2024-01-31T12:01:00Z", "", "2024-01-31T12:01:01.5Z"]);
+    dates.variables.insert("time", (Vec::new(), texts));
+    let found = times(&dates, 3).unwrap();
+    assert_eq!(
+        (first(&found).as_str(), found.time_s[2]),
+        ("2024-01-31T12:01:00Z", 1.5)
+    );
+    assert!(found.time_s[1].is_nan());
+    let plain = Given::numbers("time", &[("units", "s")], &[7.0]);
+    let plain = times(&plain, 1).unwrap();
+    assert_eq!((plain.reference, plain.time_s), (None, vec![7.0]));
+}
+
+#[test]
+fn times_that_are_not_understood_are_unknown_and_named() {
+    for attributes in [
+        &[("units", "seconds since yesterday")][..],
+        &[("units", "months since 2024-01-01")],
+        &[("units", "day as %Y%m%d.%f")],
+        &[("units", "days since 2024-01-01"), ("calendar", "noleap")],
+    ] {
+        let found = times(&Given::numbers("time", attributes, &[1.0]), 1).unwrap();
+        let named = found.not_understood.unwrap();
+        assert!(named.contains(attributes[0].1), "{named}");
+        assert!(found.time_s[0].is_nan() && found.reference.is_none());
+    }
+}
