@@ -4,6 +4,7 @@
 
 use super::realisations::{RetrievalRow, SceneRetrieval};
 use super::table::{UNKNOWN, VORTEX, measured, name as word, with};
+use super::truth::is_there;
 use crate::io::Table;
 use crate::scene::RetrievalMethod as Method;
 use wakescope_estimate::retrieval::{Measured, Side};
@@ -49,7 +50,7 @@ fn quantity(row: &RetrievalRow, number: usize) -> (Measured, f64) {
 }
 
 impl SceneRetrieval {
-    /// The errors of all quantities whose truth is known.
+    /// The errors of all quantities whose truth is known, over the scans in which there is a vortex.
     fn errors(&self) -> Vec<Errors> {
         let mut all = Vec::new();
         // One scan has each method and side once.
@@ -59,11 +60,9 @@ impl SceneRetrieval {
             .filter(|row| (row.realisation, row.sweep) == (0, 0))
         {
             let of = (first.method, first.truth.side);
-            let rows: Vec<_> = self
-                .rows
-                .iter()
-                .filter(|row| (row.method, row.truth.side) == of)
-                .collect();
+            let is_own =
+                |row: &&RetrievalRow| (row.method, row.truth.side) == of && is_there(&row.truth);
+            let rows: Vec<_> = self.rows.iter().filter(is_own).collect();
             for (number, name) in quantities() {
                 all.extend(
                     errors(number, &rows)

@@ -44,8 +44,19 @@ fn exact(
     }
 }
 
+/// A vortex that is not there, since the aircraft has not passed yet.
+fn absent(side: Side, time_s: f64) -> VortexResult {
+    exact(side, ((f64::NAN, f64::NAN), time_s), [0.0, 0.0], None)
+}
+
+/// Whether the air has this vortex.
+pub(super) fn is_there(truth: &VortexResult) -> bool {
+    truth.circulation_m2_s.value != 0.0
+}
+
 /// Both vortices of the air, left and right, as some lines pass them: exact numbers. In a simulated flow the circulation depends on
-/// the radius, so that it and the core radius are not known.
+/// the radius, so that it and the core radius are not known. In a plane that the aircraft has not reached there is no vortex: its circulation is 0
+/// and its place is not known.
 ///
 /// # Errors
 /// A simulated flow in which no vortices are found; what the wind refuses.
@@ -70,6 +81,9 @@ pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResul
                 };
                 let mean_m2_s = pair.circulation_m2_s * profile.mean_5_15(pair.core_radius_m).0;
                 let passage = when_passed(plan, lines, centre)?;
+                if pair.aircraft.is_some() && passage.1 + since_s < 0.0 {
+                    return Ok(absent(side, passage.1));
+                }
                 Ok(exact(
                     side,
                     passage,
@@ -285,6 +299,30 @@ mod tests {
             // the other vortex has no circulation within 15 m
             let ratio = found.circulation_5_15_m2_s.value / truth.circulation_5_15_m2_s.value;
             assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+        }
+    }
+
+    #[test]
+    fn before_the_aircraft_has_passed_there_is_no_vortex() {
+        let behind = |x_m: f64| {
+            plan(|pair| {
+                pair.motion = VortexMotion::Inviscid;
+                pair.aircraft = Some(crate::scene::Aircraft {
+                    speed_m_s: 70.0,
+                    x_m,
+                })
+            })
+        };
+        // The scan lasts 7.4 s: the aircraft comes after its end, in its middle and before its beginning.
+        for (x_m, there) in [(-700.0, 0), (-70.0, 2), (70.0, 2)] {
+            let plan = behind(x_m);
+            let truth = true_vortices(&plan, &lines(&plan)).unwrap();
+            assert_eq!(truth.iter().filter(|v| is_there(v)).count(), there, "{x_m}");
+            assert_eq!(true_wake(&truth).is_some(), there == 2, "{x_m}");
+            for vortex in truth.iter().filter(|v| !is_there(v)) {
+                assert_eq!(vortex.circulation_5_15_m2_s.value, 0.0);
+                assert!(vortex.lateral_position_m.value.is_nan());
+            }
         }
     }
 
