@@ -161,18 +161,9 @@ fn hold_schedule(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
     hold("smear_rad", 0.0, 0.0);
     hold("smear_m", 0.0, 0.0);
     if s.s("flow.kind") == "vortex_pair" && s.f("flow.circulation_m2_s") > 0.0 {
-        // In free air: down with V0 (V8), across with all uniform winds.
+        // In free air: down with V0 (V8); superposed winds carry no pair.
         let down = s.f("flow.circulation_m2_s") / (2.0 * PI * s.f("flow.spacing_m"));
-        let added = s
-            .get("added_flows")
-            .and_then(|v| v.as_array().cloned())
-            .unwrap_or_default();
-        let across = s.f("flow.cross_wind_m_s")
-            + added
-                .iter()
-                .filter_map(|a| a.get("lateral_m_s").and_then(toml::Value::as_float))
-                .sum::<f64>();
-        hold("wake_moves_m", down.hypot(across) * duration_s, 1e-6);
+        hold("wake_moves_m", down * duration_s, 1e-6);
     }
 }
 

@@ -20,7 +20,7 @@ pub struct ScanSchedule {
     pub duration_s: f64,
     /// Longest time from the beginning of a sweep to that of the next, s; NaN for one sweep.
     pub revisit_s: f64,
-    /// How far a wake sinks meanwhile by itself and drifts with the wind, m; NaN where no pair is known.
+    /// How far the pair sinks meanwhile in free air, m; NaN where no pair is known. The wind of a scene is superposed: it carries no pair.
     pub wake_moves_m: f64,
     /// Range from which the pulse before comes back at the same time, m.
     pub ambiguous_range_m: f64,
@@ -49,30 +49,7 @@ impl Plan {
             }
         });
         let wake_moves_m = pair.map_or(f64::NAN, |pair| {
-            let sinks_m_s = crate::setup::wind::vortex_pair(pair).descent_speed_m_s();
-            // Across and up, at the place of the pair and in the mean over the time.
-            let carries = |flow: &Flow| match flow {
-                Flow::Uniform {
-                    lateral_m_s,
-                    vertical_m_s,
-                } => [*lateral_m_s, *vertical_m_s],
-                Flow::Linear(wind) => {
-                    [(1, wind.gradient_v_per_s), (2, wind.gradient_w_per_s)].map(|(d, gradient)| {
-                        let [_, by_y, by_z] = gradient;
-                        wind.velocity_m_s[d]
-                            + 0.5 * meanwhile_s * wind.acceleration_m_s2[d]
-                            + by_y * pair.lateral_position_m
-                            + by_z * pair.height_m
-                    })
-                }
-                _ => [0.0; 2],
-            };
-            let wind_m_s = flows()
-                .map(carries)
-                .fold([pair.cross_wind_m_s, 0.0], |a, b| {
-                    [a[0] + b[0], a[1] + b[1]]
-                });
-            meanwhile_s * (wind_m_s[1] - sinks_m_s).hypot(wind_m_s[0])
+            meanwhile_s * crate::setup::wind::vortex_pair(pair).descent_speed_m_s()
         });
         let turned = |line: &crate::setup::beams::Line| {
             let fastest = line.rate_rad_s[0].abs().max(line.rate_rad_s[1].abs());
@@ -111,7 +88,7 @@ impl std::fmt::Display for ScanSchedule {
         if self.wake_moves_m.is_finite() {
             write!(
                 f,
-                "; a wake in free air moves {:.1} m meanwhile",
+                "; a wake in free air sinks {:.1} m meanwhile",
                 self.wake_moves_m
             )?;
         }
@@ -158,21 +135,13 @@ mod tests {
             (plain.wake_moves_m - 1.6931 * 7.3975).abs() < 0.01,
             "{plain:?}"
         );
-        // A cross wind is one whichever flow brings it.
-        let [of_pair, added, linear] = [
+        // Winds are superposed and carry no pair.
+        for words in [
             "[flow]\ncross_wind_m_s = 6.0\n",
             "[[added_flows]]\nkind = \"uniform\"\nlateral_m_s = 6.0\nvertical_m_s = 0.0\n",
-            "[[added_flows]]\nkind = \"linear\"\nvelocity_m_s = [0.0, 5.06, 0.0]\ngradient_v_per_s = [0.0, 0.0, 0.02]\n",
-        ]
-        .map(|words| schedule(words).wake_moves_m);
-        assert!(
-            (of_pair - 7.3975 * 6.0_f64.hypot(1.6931)).abs() < 0.01,
-            "{of_pair}"
-        );
-        assert!(
-            (added - of_pair).abs() < 1e-9 && (linear - of_pair).abs() < 1e-9,
-            "{added} {linear} {of_pair}"
-        );
+        ] {
+            assert_eq!(schedule(words).wake_moves_m, plain.wake_moves_m, "{words}");
+        }
         let text = "[scan]\nhead = { motion = \"continuous\", sweeps = 3, direction = \"alternate\", rate_rad_s = 0.03125, \
                     acceleration_rad_s2 = 0.5 }\n";
         let back = schedule(text);

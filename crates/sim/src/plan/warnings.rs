@@ -10,6 +10,9 @@ use crate::setup::region::places;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use wakescope_estimate::map::PolarPoint;
 
+/// Least shift of velocities by the pulse that is reported, m/s.
+const SHIFT_M_S: f64 = 0.01;
+
 /// What the user should know of a scene whose air has a radial velocity of at most `fastest_m_s`, m/s, but for its phase screens and gates.
 ///
 /// # Errors
@@ -18,6 +21,7 @@ pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, E
     let scene = &setup.scene.content;
     let (e, method) = (&scene.estimator, scene.estimator.method);
     let mut out = Vec::from_iter(of_fast_air(setup, fastest_m_s));
+    out.extend(of_shifted_pulse(setup));
     if e.padded_samples < 4 * e.window_samples {
         let (step_m_s, off_m_s) = grid_step_and_bias_m_s(scene)?;
         out.push(format!(
@@ -63,6 +67,20 @@ fn of_fast_air(setup: &Setup, fastest_m_s: f64) -> Option<String> {
         format!(
             "the air on the lines of sight{seen} reaches {fastest_m_s:.1} m/s, the detector band ends at {half_band_m_s:.1} m/s: faster \
              air is not seen"
+        )
+    })
+}
+
+/// A pulse whose own mean frequency shifts all velocities.
+fn of_shifted_pulse(setup: &Setup) -> Option<String> {
+    let mean_hz = setup.instrument.pulse.mean_frequency_hz();
+    let shift_m_s = -0.5 * setup.scene.content.laser.wavelength_m * mean_hz;
+    (shift_m_s.abs() >= SHIFT_M_S).then(|| {
+        format!(
+            "pulse.shape: the mean frequency of the pulse is {:.3} MHz beside that of the laser: it shifts every velocity by {shift_m_s:.2} m/s, \
+             which no estimator takes off; a phase less 2 pi x {:.3} MHz x time has none",
+            1e-6 * mean_hz,
+            1e-6 * mean_hz,
         )
     })
 }
@@ -220,6 +238,36 @@ mod tests {
         );
         assert!(!warnings(1.02 * rate_hz).is_empty());
         assert!(warnings(Scene::default().laser.pulse_repetition_hz).is_empty());
+    }
+
+    #[test]
+    fn a_pulse_with_a_mean_frequency_is_warned_of_with_the_shift_and_one_with_a_symmetric_chirp_is_not()
+     {
+        use crate::scene::{PulseShape, SampledShape};
+        let warnings = |phase: fn(f64) -> f64| {
+            plan(|s| {
+                let time_s: Vec<f64> = (-100..=100).map(|i| 4e-9 * f64::from(i)).collect();
+                s.pulse.shape = PulseShape::Sampled(SampledShape {
+                    power: time_s
+                        .iter()
+                        .map(|t| (-(t / 120e-9).powi(2)).exp())
+                        .collect(),
+                    phase_rad: time_s.iter().map(|t| phase(*t)).collect(),
+                    time_s,
+                    centred: true,
+                });
+            })
+            .warnings
+        };
+        let found = warnings(|time_s| std::f64::consts::TAU * 2e6 * time_s);
+        let shift_m_s = -0.5 * Scene::default().laser.wavelength_m * 2e6;
+        assert!(
+            found.len() == 1
+                && found[0].contains("2.000 MHz")
+                && found[0].contains(&format!("by {shift_m_s:.2} m/s")),
+            "{found:?}"
+        );
+        assert!(warnings(|time_s| 1e13 * time_s * time_s).is_empty());
     }
 
     #[test]
