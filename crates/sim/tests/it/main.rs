@@ -14,6 +14,8 @@ mod detection;
 #[cfg(feature = "cli")]
 mod estimate;
 #[cfg(feature = "cli")]
+mod files_of_others;
+#[cfg(feature = "cli")]
 mod host;
 #[cfg(feature = "cli")]
 mod hostile_files;

@@ -115,6 +115,54 @@ fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
     );
 }
 
+#[test]
+fn fields_with_the_names_of_other_programs_are_read() {
+    // Written by Python's libraries (`tests/files-of-others/make.py`), of a wind that is linear in place.
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/files-of-others");
+    let scan = "elevation_min_rad = 0.2\nelevation_max_rad = 0.6\n\
+                elevation_step_rad = 0.1\noutside_flow = { policy = \"mask\" }\nbelow_ground = { policy = \"mask\" }\n";
+    let wind = |[x, y, z]: [f64; 3], t: f64| {
+        [
+            1.0 + 0.01 * z,
+            2.0 + 0.02 * z + 0.001 * y + t,
+            -0.5 + 0.003 * x,
+        ]
+    };
+    for (file, more, growth_per_s) in [
+        ("fields_of_cm1.nc", "motion = \"frozen\"\n", 0.0),
+        #[cfg(feature = "netcdf4")]
+        (
+            "fields_of_wrf.nc",
+            "names = [\"U\", \"V\", \"W\"]\nmotion = \"moving\"\n",
+            0.1,
+        ),
+    ] {
+        let flow = format!(
+            "kind = \"fields\"\nfiles = \"{file}\"\norigin_m = [-240.0, 100.0, 0.0]\n{more}"
+        );
+        let plan = plan_in(Path::new(folder), [&flow, scan, ""], Target::Map).unwrap();
+        let map = map(&plan);
+        let mut known = 0;
+        for ((line, gate), found) in map
+            .v_exact_m_s
+            .indexed_iter()
+            .filter(|(_, v)| v.is_finite())
+        {
+            let beam = plan.geometry.schedule.middle(line);
+            let [x, y, z] = beam.at_range_m(map.range_m[gate]);
+            let later_s = plan.wind.start_s + beam.time_s;
+            let air = wind([x + 240.0, y - 100.0, z], growth_per_s * later_s);
+            let expected = beam.direction.radial_velocity_m_s(air, [0.0; 3]);
+            assert!(
+                (found - expected).abs() < 1e-5,
+                "{file}: {found} {expected}"
+            );
+            known += 1;
+        }
+        assert!(known > 30, "{file}: {known}");
+    }
+}
+
 #[cfg(feature = "netcdf4")]
 #[test]
 fn fields_in_netcdf4_are_read_time_by_time() {
