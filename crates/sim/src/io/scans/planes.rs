@@ -9,7 +9,6 @@
 use super::ReadScan;
 use super::grid::RayRow;
 use ndarray::{Array2, s};
-use std::collections::BTreeSet;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 use std::ops::Range;
 use wakescope_estimate::retrieval::ScanMap;
@@ -219,12 +218,16 @@ fn split(
 
 /// The azimuths of scans in words, if they are known.
 fn at_azimuths(scans: &[PlaneScan]) -> String {
-    let degrees = |scan: &PlaneScan| Some(format!("{:.1}", scan.azimuth_rad?.to_degrees()));
-    let azimuths: BTreeSet<String> = scans.iter().filter_map(degrees).collect();
+    let mut azimuths: Vec<String> = Vec::new();
+    for azimuth_rad in scans.iter().filter_map(|scan| scan.azimuth_rad) {
+        let degrees = format!("{:.1}", azimuth_rad.to_degrees());
+        if !azimuths.contains(&degrees) {
+            azimuths.push(degrees);
+        }
+    }
     if azimuths.is_empty() {
         return String::new();
     }
-    let azimuths: Vec<String> = azimuths.into_iter().collect();
     format!(" at azimuth {} degrees", azimuths.join(", "))
 }
 
@@ -596,7 +599,7 @@ mod tests {
         assert_eq!(
             skipped,
             [
-                "5 of 309 rays lie outside its scans in elevation (RHI) at azimuth 120.0, 270.0, 90.0 degrees"
+                "5 of 309 rays lie outside its scans in elevation (RHI) at azimuth 90.0, 120.0, 270.0 degrees"
             ]
         );
     }
