@@ -11,6 +11,7 @@ use crate::claim::{Claim, Kind};
 use crate::cost::clock_s;
 use crate::figures::context::{Context, Rendered, column};
 use crate::figures::{self, Figure, Lane};
+use crate::statistics::Verdict;
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -23,7 +24,8 @@ use wakescope_sim::io::{Table, write_atomic};
 /// Runs the task.
 ///
 /// # Errors
-/// Unknown figure, unusable output, or a figure that cannot be computed. A failed claim is no error.
+/// Unknown figure, unusable output, a figure that cannot be computed, or a claim of the program's own that fails. A claim
+/// of the chapter that fails is a result.
 pub(crate) fn run(
     only: &[u32],
     out: Option<PathBuf>,
@@ -200,7 +202,18 @@ fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)], run_s: f6
         report::counted(Kind::Own, &claims),
         out.join("index.html").display()
     );
-    Ok(())
+    let failed: Vec<&str> = claims
+        .iter()
+        .filter(|claim| claim.kind() != Kind::Chapter && claim.verdict == Verdict::Fail)
+        .map(|claim| claim.id.as_str())
+        .collect();
+    if failed.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(format!(
+        "what the program claims of itself does not hold: {}",
+        failed.join(", ")
+    )))
 }
 
 fn claims_table(claims: &[&Claim]) -> Table {

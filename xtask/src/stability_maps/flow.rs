@@ -140,8 +140,14 @@ fn largest_amplitude(flow: &mut Flow) -> Option<f64> {
     Some(amplitudes.fold(0.0, f64::max))
 }
 
-/// Decay of the shortest wave in a step up to which the solver takes viscosity explicitly.
-const EXPLICIT: f64 = 0.1;
+/// Decay of the shortest wave in a step up to which the solver takes viscosity explicitly: a tenth of
+/// the decay up to which the scheme itself is stable on the real axis.
+fn explicit_up_to(scheme: TimeScheme) -> f64 {
+    match scheme {
+        TimeScheme::AdamsBashforth2 => 0.1,
+        TimeScheme::RungeKutta3 => 0.25,
+    }
+}
 
 /// The Courant number up to which every wave decays, with `viscous = nu dt/h^2` explicit where it is small and by Crank-Nicolson else.
 fn limit(scheme: TimeScheme, viscous: f64) -> f64 {
@@ -162,7 +168,7 @@ fn limit(scheme: TimeScheme, viscous: f64) -> f64 {
 fn decays(scheme: TimeScheme, viscous: f64, courant: f64, theta: f64) -> bool {
     let kappa = 2.0 * (9.0 / 8.0 * (0.5 * theta).sin() - (1.5 * theta).sin() / 24.0);
     let decay = viscous * kappa * kappa;
-    let [explicit, implicit] = if viscous * KAPPA2 > EXPLICIT {
+    let [explicit, implicit] = if viscous * KAPPA2 > explicit_up_to(scheme) {
         [0.0, decay]
     } else {
         [decay, 0.0]
