@@ -104,12 +104,12 @@ pub enum Error {
     },
     /// The velocity map shows no vortex pair.
     #[error(
-        "no vortex pair found: the best one has a significance of {significance:.1}, at least {needed} is needed"
+        "no vortex pair found: the best one takes {statistic:.1} from the chi-square of the wind, at least {needed} is needed"
     )]
     NoVortex {
-        /// Significance of the best pair.
-        significance: f64,
-        /// Least significance that is accepted.
+        /// Chi-square that the best pair takes from the wind.
+        statistic: f64,
+        /// Least one that is accepted.
         needed: f64,
     },
     /// Too few points of a map are finite.

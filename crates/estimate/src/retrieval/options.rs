@@ -2,7 +2,8 @@
 
 use crate::error::{Error, not_negative, positive};
 use crate::vortex_fit::{
-    CorePrior, FreeParameters, Loss, RangeKernel, Secondary, Vortex, Wake, WakeModel, WindFit,
+    CorePrior, FreeParameters, Loss, MapFitOptions, RangeKernel, Secondary, Vortex, Wake,
+    WakeModel, WindFit,
 };
 
 /// What a velocity of the map is of the air about its range.
@@ -101,6 +102,9 @@ pub struct RetrievalOptions {
     pub movement: Movement,
     /// Least statistic (see [`ScanResult::statistic`](crate::retrieval::ScanResult::statistic)) of a wake.
     pub threshold: f64,
+    /// Least statistic of a pair that is fitted to what an estimator shows: of [`MapFitOptions::least_statistic`], or nothing where a test
+    /// has found the wake.
+    pub threshold_of_estimates: f64,
     /// A wake to start from beside the blind search, such as the prediction of a track.
     pub start: Option<Wake>,
 }
@@ -155,6 +159,7 @@ impl Default for RetrievalOptions {
             covariance: Covariance::Sandwich,
             movement: Movement::Auto,
             threshold: Self::DEFAULT_THRESHOLD,
+            threshold_of_estimates: MapFitOptions::default().least_statistic,
             start: None,
         }
     }

@@ -180,8 +180,10 @@ impl<'a> Report<'a> {
                 .windows(2)
                 .all(|pair| pair[0] == pair[1]);
         let unmoved = !moves && !instant;
+        let stands_out = statistic >= self.stage.options.threshold;
         let flags = [
-            (Flag::NoWake, vortices.is_empty()),
+            (Flag::NoWake, vortices.is_empty() && !stands_out),
+            (Flag::Uncertain, vortices.is_empty() && stands_out),
             (Flag::OneVortex, vortices.len() == 1),
             (
                 Flag::CoreKept,

@@ -153,6 +153,8 @@ pub enum Flag {
     NoWake,
     /// The vortices that explain the scan best are none of an aircraft, or the scan does not resolve them.
     Implausible,
+    /// A wake was found, but a circulation is less than three of its deviations, or nothing is known of the vortices.
+    Uncertain,
     /// One vortex only is in view.
     OneVortex,
     /// The core radius is not of this scan.
@@ -179,6 +181,8 @@ pub enum Flag {
     Thinned,
     /// The fit came to no end: what is told is where it was.
     NotConverged,
+    /// The test of the scan for a wake, at the rate of false alarms that is stated for it, does not find this one.
+    NotDetected,
 }
 
 impl Flag {

@@ -477,13 +477,14 @@ fn text(found: &[RetrievedScan]) -> String {
         };
         let name = format!("scan {}", number + 1);
         if scan.result.has(Flag::NoWake) || scan.result.vortices.is_empty() {
-            let (statistic, threshold) = (scan.result.statistic, scan.result.threshold);
-            let (why, certain) = match statistic < threshold {
-                true => ("below", ""),
-                false => ("above", ", but no circulation is certain"),
+            let (what, why) = if scan.result.has(Flag::Uncertain) {
+                ("a wake, but no circulation is certain", "above")
+            } else {
+                ("no wake", "below")
             };
             out += &format!(
-                "{name}: no wake, statistic {statistic:.1} {why} {threshold:.1}{certain}{flags}\n"
+                "{name}: {what}, statistic {:.1} {why} {:.1}{flags}\n",
+                scan.result.statistic, scan.result.threshold
             );
         }
         for vortex in &scan.result.vortices {

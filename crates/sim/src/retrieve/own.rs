@@ -18,8 +18,8 @@ use wakescope_estimate::retrieval::{
 };
 use wakescope_estimate::vortex_fit::{
     EstimatorResponse, MapFit, MapFitOptions, Parameter, SignalFit, SignalFitOptions, VelocityMap,
-    Wake, fit_map_of_estimator, fit_secondary_vortices, fit_signals, refine_map_fit_of_estimator,
-    with_local_circulations,
+    Wake, WakeModel, fit_map_of_estimator, fit_secondary_vortices, fit_signals,
+    refine_map_fit_of_estimator, with_local_circulations,
 };
 use wakescope_estimate::window::Sample;
 
@@ -36,18 +36,15 @@ impl SceneResponse {
         self.snr_at(y_m.hypot(z_m - self.scene.scan.lidar_height_m))
     }
 
-    /// The fit to what the estimator of the scene shows, for a map in which `found` has a wake: of a pair, as means may show but one of its
-    /// vortices and the other may be beyond the scan, else of the one that is found. Nothing where there is no wake, the estimator is one of those without such a model, or
-    /// the fit does not come to an end. The options are those with the secondary vortices that the map shows beside the pair.
+    /// The fit to what the estimator of the scene shows, for a map in which means show `found`: of a pair, as means may show but one of its
+    /// vortices or none and the other may be beyond the scan, else of the one that is found. Nothing where no wake stands out of the wind,
+    /// the estimator is one of those without such a model, or the fit does not come to an end. The options are those with the secondary vortices that the map shows beside the pair.
     pub(super) fn refined(
         &self,
         map: &ScanMap,
         options: &RetrievalOptions,
         found: &ScanResult,
     ) -> Option<(ScanResult, RetrievalOptions)> {
-        if found.statistic.is_nan() || found.statistic < options.threshold {
-            return None;
-        }
         let range_of =
             |vortex: &VortexResult| options.model.range_and_elevation(vortex.place_m()).0;
         let range_m = match found.vortices.len() {
@@ -71,15 +68,13 @@ impl SceneResponse {
                 core_radius_m: options.core_radius_m,
                 loss: options.loss,
                 secondary: options.secondary,
+                least_statistic: options.threshold_of_estimates,
                 correlated_lines: self.correlated_lines(spacing_m(&map.elevation_rad), range_m),
                 ..MapFitOptions::default()
             },
         };
         let sector = (&map.elevation_rad[..], &map.range_m[..]);
         let is_seen = |vortex: &VortexResult| options.model.sees(sector, vortex.place_m());
-        let is_certain = |vortex: &VortexResult| {
-            vortex.circulation_m2_s.value > CERTAIN_SIGMAS * vortex.circulation_m2_s.std
-        };
         let unseen = |pair: &ScanResult| {
             pair.vortices
                 .iter()
@@ -87,18 +82,47 @@ impl SceneResponse {
                 .count()
         };
         match (fits.pair(found), found.vortices.len()) {
-            (Some(pair), 2) => Some(pair),
+            (Ok(pair), 2) => Some(pair),
             // What is beyond the scan acts on what is in it, but is not told. Where nothing is found in it, anything may be beyond.
-            (Some((pair, options)), count)
-                if pair.vortices.iter().all(is_certain) && unseen(&pair) <= count =>
+            (Ok((pair, options)), 1)
+                if unseen(&pair) <= 1 && pair.vortices.iter().all(is_certain) =>
             {
                 Some((telling(pair, is_seen), options))
             }
             (_, 1) => fits
                 .one(found)
                 .filter(|(one, _)| one.vortices.iter().all(is_certain)),
-            _ => None,
+            (Ok((pair, options)), _) => {
+                Some((self.of_blind_search(pair, map, &options.model), options))
+            }
+            (Err(wakescope_estimate::Error::NoVortex { statistic, needed }), 0) => {
+                Some((calm(found, statistic, needed), options.clone()))
+            }
+            (Err(_), _) => None,
         }
+    }
+
+    /// A pair that stands out of the wind where means show no vortex: told if both are in view and more likely than not.
+    fn of_blind_search(
+        &self,
+        mut pair: ScanResult,
+        map: &ScanMap,
+        model: &WakeModel,
+    ) -> ScanResult {
+        // the outermost gates see half a window beyond their middles
+        let half_window_m =
+            0.5 * self.scene.estimator.window_samples as f64 * self.scene.sample_spacing_m();
+        let [near_m, far_m] = ends_m(&map.range_m);
+        let range_m = [near_m - half_window_m, far_m + half_window_m];
+        let is_told = |vortex: &VortexResult| {
+            model.sees((&map.elevation_rad, &range_m), vortex.place_m()) && is_likely(vortex)
+        };
+        if !pair.vortices.iter().all(is_told) {
+            return untold(pair);
+        }
+        let are_certain = pair.vortices.iter().all(is_certain);
+        pair.set(Flag::Uncertain, !are_certain);
+        pair
     }
 }
 
@@ -115,7 +139,10 @@ struct Fits<'a> {
 impl Fits<'_> {
     /// The fit from a start or, without one, from a blind search on, and whether its vortices move: as stated, else as it is likely in scans
     /// that last so long unless the other is clearly better.
-    fn best(&self, start: Option<&Wake>) -> Option<(MapFit, bool)> {
+    ///
+    /// # Errors
+    /// What the fits refuse.
+    fn best(&self, start: Option<&Wake>) -> Result<(MapFit, bool), wakescope_estimate::Error> {
         let moves = match self.options.movement {
             Movement::Moving => true,
             Movement::Frozen => false,
@@ -123,25 +150,26 @@ impl Fits<'_> {
         } && self.scan.has_times();
         let (view, model, options) = (&self.view, &self.options.model, &self.map_options);
         let from = |moves, start: &Wake| {
-            refine_map_fit_of_estimator(view, model, self.shown(moves), start, options).ok()
+            refine_map_fit_of_estimator(view, model, self.shown(moves), start, options)
         };
         let first = match start {
             Some(start) => from(moves, start)?,
-            None => fit_map_of_estimator(view, model, self.shown(moves), options).ok()?,
+            None => fit_map_of_estimator(view, model, self.shown(moves), options)?,
         };
         if self.options.movement != Movement::Auto || self.scan.lasts_s() == 0.0 {
-            return Some((first, moves));
+            return Ok((first, moves));
         }
         let chi2 = |fit: &MapFit| fit.tops.first().map_or(f64::INFINITY, |top| top.chi2);
         let is_better =
             |other: &MapFit, than: &MapFit| chi2(than) - chi2(other) > RetrievalOptions::MOVES;
-        let Some(other) = from(!moves, &first.wake).filter(|other| is_better(other, &first)) else {
-            return Some((first, moves));
+        let other = from(!moves, &first.wake).ok();
+        let Some(other) = other.filter(|other| is_better(other, &first)) else {
+            return Ok((first, moves));
         };
         // It may be better because it came to another place: there, too, the first has to be worse.
-        match from(moves, &other.wake).filter(|again| !is_better(&other, again)) {
-            Some(again) => Some((again, moves)),
-            None => Some((other, !moves)),
+        match from(moves, &other.wake) {
+            Ok(again) if !is_better(&other, &again) => Ok((again, moves)),
+            _ => Ok((other, !moves)),
         }
     }
 
@@ -149,8 +177,14 @@ impl Fits<'_> {
         if moves { &self.moving } else { &self.still }
     }
 
-    /// A pair, and the options with the secondary vortices that the map shows beside it.
-    fn pair(&self, found: &ScanResult) -> Option<(ScanResult, RetrievalOptions)> {
+    /// A pair that stands out of the wind, and the options with the secondary vortices that the map shows beside it.
+    ///
+    /// # Errors
+    /// What the fit of the pair refuses.
+    fn pair(
+        &self,
+        found: &ScanResult,
+    ) -> Result<(ScanResult, RetrievalOptions), wakescope_estimate::Error> {
         let mut options = self.options.clone();
         let (mut fit, moves) = self.best(None)?;
         let shown = self.shown(moves);
@@ -173,21 +207,59 @@ impl Fits<'_> {
                 .ok()
                 .flatten();
         let are_local = local.is_some();
-        let mut result = of_fit(found, self.scan, &options, &local.unwrap_or(fit), moves);
+        let fit = local.unwrap_or(fit);
+        let mut result = of_fit(found, self.scan, &options, &fit, moves);
+        result.statistic = fit.statistic;
+        result.threshold = self.map_options.least_statistic;
         result.set(Flag::SecondaryVortices, are_shown);
         result.set(Flag::LocalCirculation, are_local);
-        Some((result, options))
+        Ok((result, options))
     }
 
     /// The one vortex that is found; another may be there beyond the scan.
     fn one(&self, found: &ScanResult) -> Option<(ScanResult, RetrievalOptions)> {
-        let (fit, moves) = self.best(found.wake.as_ref())?;
+        let (fit, moves) = self.best(found.wake.as_ref()).ok()?;
         let result = of_fit(found, self.scan, self.options, &fit, moves);
         Some((
             telling(result, |vortex| found.vortex(vortex.side).is_some()),
             self.options.clone(),
         ))
     }
+}
+
+/// Whether a circulation is positive beyond doubt.
+fn is_certain(vortex: &VortexResult) -> bool {
+    vortex.circulation_m2_s.value > CERTAIN_SIGMAS * vortex.circulation_m2_s.std
+}
+
+/// The first and the last number of an axis, m; NaN if it has none.
+fn ends_m(axis_m: &[f64]) -> [f64; 2] {
+    [axis_m.first(), axis_m.last()].map(|end| end.copied().unwrap_or(f64::NAN))
+}
+
+/// Whether a circulation is at least as large as its deviation.
+fn is_likely(vortex: &VortexResult) -> bool {
+    vortex.circulation_m2_s.value > vortex.circulation_m2_s.std
+}
+
+/// The result of a scan in which no pair stands out of the wind by the least statistic that is needed.
+fn calm(found: &ScanResult, statistic: f64, needed: f64) -> ScanResult {
+    let mut result = ScanResult {
+        statistic,
+        threshold: needed,
+        ..found.clone()
+    };
+    result.set(Flag::Uncertain, false);
+    result.set(Flag::NoWake, true);
+    result
+}
+
+/// The result of a wake that stands out of the wind while its vortices are not known.
+fn untold(result: ScanResult) -> ScanResult {
+    let mut result = telling(result, |_| false);
+    result.wake = None;
+    result.set(Flag::Uncertain, true);
+    result
 }
 
 /// The result without the vortices that are not to be told.
@@ -363,6 +435,7 @@ pub(super) fn retold(
         result.chi2_per_dof = f64::NAN;
     }
     result.set(Flag::NoWake, false);
+    result.set(Flag::Uncertain, false);
     let is_instant = map.has_times() && map.lasts_s() == 0.0;
     result.set(Flag::MotionIgnored, !moves && !is_instant);
     result.set(Flag::NotConverged, false);

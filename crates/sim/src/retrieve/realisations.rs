@@ -16,7 +16,7 @@ use crate::plan::{Plan, Stage};
 use crate::scene::{FollowingAircraft, RetrievalMethod as Method, Scene};
 use crate::setup::progress::{Observer, Silent};
 use ndarray::{Array2, ArrayView2};
-use wakescope_estimate::retrieval::{RetrievalOptions, ScanMap, VortexResult};
+use wakescope_estimate::retrieval::{Flag, RetrievalOptions, ScanMap, VortexResult};
 use wakescope_estimate::vortex_fit::{CoreProfile, Follower, Wake, WakeModel};
 use wakescope_estimate::window::Sample;
 
@@ -110,8 +110,13 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
                 velocity_m_s,
             )
         };
+        let test = tests.get(realisation).copied();
         let by = |method| {
-            let found = retrieve_map(scan(), method, options.clone(), velocities).ok();
+            let mut options = options.clone();
+            if test.is_some_and(is_detected) {
+                options.threshold_of_estimates = 0.0;
+            }
+            let found = retrieve_map(scan(), method, options, velocities).ok();
             found.map(|(found, _)| found)
         };
         // the fit of the map also starts that of the signals
@@ -133,6 +138,10 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
                     observer,
                 )?,
                 (_, map, _) => map.filter(|_| method == Method::Fit),
+            };
+            let found = match test {
+                Some(test) => found.map(|found| compared_with_test(found, test)),
+                None => found,
             };
             rows.extend(rows_of(
                 scene,
@@ -209,6 +218,24 @@ fn of_signals<S: Sample + wakescope_signal::Sample>(
     Ok(own
         .of_records(samples, elevation_rad, of_map, observer)
         .ok())
+}
+
+/// The scan with flags where its fit and its test for a wake disagree.
+fn compared_with_test(mut scan: RetrievedScan, test: (f64, f64)) -> RetrievedScan {
+    let is_detected = is_detected(test);
+    let result = &mut scan.result;
+    if is_detected && result.has(Flag::NoWake) {
+        result.set(Flag::NoWake, false);
+        result.set(Flag::Uncertain, true);
+    }
+    let has_vortices = !result.vortices.is_empty();
+    result.set(Flag::NotDetected, has_vortices && !is_detected);
+    scan
+}
+
+/// Whether a test finds a wake: its statistic is above its threshold.
+pub(super) fn is_detected((statistic, threshold): (f64, f64)) -> bool {
+    statistic > threshold
 }
 
 fn rows_of(

@@ -2,7 +2,7 @@
 //!
 //! Check: means and deviations by hand; failures are counted and not averaged.
 
-use super::realisations::{RetrievalRow, SceneRetrieval};
+use super::realisations::{RetrievalRow, SceneRetrieval, is_detected};
 use super::table::{UNKNOWN, VORTEX, measured, name as word, with};
 use super::truth::is_there;
 use crate::io::Table;
@@ -76,11 +76,7 @@ impl SceneRetrieval {
     /// Share of the maps whose test says wake; nothing without a test.
     #[must_use]
     pub fn detected(&self) -> Option<f64> {
-        let found = self
-            .tests
-            .iter()
-            .filter(|(statistic, threshold)| statistic > threshold)
-            .count();
+        let found = self.tests.iter().filter(|test| is_detected(**test)).count();
         (!self.tests.is_empty()).then(|| found as f64 / self.tests.len() as f64)
     }
 

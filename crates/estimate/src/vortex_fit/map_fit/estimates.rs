@@ -64,7 +64,7 @@ pub fn fit_map(
     kernel: &RangeKernel,
     options: &MapFitOptions,
 ) -> Result<MapFit, Error> {
-    let guess = first_guess(map, model, kernel)?;
+    let guess = first_guess(map, model, kernel, options.least_statistic)?;
     let gates = Gates::at_rest(model, kernel.clone(), (map.elevation_rad, map.range_m));
     let setting = Setting {
         map,
@@ -75,7 +75,8 @@ pub fn fit_map(
         least_core_m: 0.0,
     };
     let refine = |start: &Wake| setting.descended(start, FINE_SIGMAS);
-    with_typical_core(best_of(&starts(&guess, options), refine)?, options, refine)
+    with_typical_core(best_of(&starts(&guess, options), refine)?, options, refine)?
+        .standing_out(options.least_statistic)
 }
 
 /// Fits the wake to a map that an estimator of this crate made, without any prior knowledge: as [`fit_map`] with its mean gate, then
@@ -92,7 +93,7 @@ pub fn fit_map_of_estimator(
 ) -> Result<MapFit, Error> {
     map.validate()?;
     let all = Shown::new(map, model, response, options, 1.0)?;
-    let guess = first_guess(map, model, &all.prepared.kernel)?;
+    let guess = first_guess(map, model, &all.prepared.kernel, options.least_statistic)?;
     let coarse = all.coarse(LINES_OVER_RADIUS[0]);
     let few = coarse.as_ref().map(|coarse| all.at(coarse)).transpose()?;
     // taken for means, peaks mislead above all the core radius, and may lead nowhere: then the guess is the start
@@ -122,8 +123,11 @@ pub fn fit_map_of_estimator(
     let for_slopes = all.coarse(LINES_OVER_RADIUS[1]);
     let all = all.with_slopes_at(for_slopes.as_ref())?;
     let refine = |start: &Wake| all.setting().refined(start, NEAR);
-    let from = |about: &Wake| {
-        let starts = starts(about, options);
+    let from = |about: &[&Wake]| {
+        let starts: Vec<Wake> = about
+            .iter()
+            .flat_map(|about| starts(about, options))
+            .collect();
         // where a map cannot be thinned its own rough ends tell which starts lead to one end, and which nowhere
         let ends = match &few {
             Some(few) => few.ends(&starts, COARSE),
@@ -132,11 +136,22 @@ pub fn fit_map_of_estimator(
         };
         best_of(if ends.is_empty() { &starts } else { &ends }, refine)
     };
-    let fit = match from(by_means.as_ref().map_or(&guess, |fit| &fit.wake)) {
-        Err(Error::NotConverged { .. }) if by_means.is_ok() => from(&guess),
-        first => first,
+    let sector = (map.elevation_rad, map.range_m);
+    let fit = match by_means.as_ref().map(|fit| &fit.wake) {
+        // a vortex that left the map on the way may have been in it
+        Ok(end)
+            if !(model.sees(sector, end.left.place_m())
+                && model.sees(sector, end.right.place_m())) =>
+        {
+            from(&[end, &guess])
+        }
+        Ok(end) => match from(&[end]) {
+            Err(Error::NotConverged { .. }) => from(&[&guess]),
+            first => first,
+        },
+        Err(_) => from(&[&guess]),
     };
-    with_typical_core(fit?, options, refine)
+    with_typical_core(fit?, options, refine)?.standing_out(options.least_statistic)
 }
 
 /// Fits the wake to a map that an estimator made, from a given start on: what is expected of a wake is the estimate from its

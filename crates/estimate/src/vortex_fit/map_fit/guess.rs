@@ -3,14 +3,14 @@
 //! The map is thinned to medians of blocks, which outliers do not move. For vortices at given places their
 //! circulations and the wind enter linearly, so every pair of places on a polar grid is tried by least squares, the
 //! left one clockwise and the right one anticlockwise as those of an aircraft are. Check: wakes at many places, in
-//! noise and among outliers, come out near enough for the fit; maps of noise hold no vortex.
+//! noise and among outliers, come out near enough for the fit.
 
 use ndarray::{Array1, Array2};
 
 use crate::error::{Error, enough_velocities};
 use crate::parallel::{map_each, map_indexed};
 use crate::vortex_fit::map_fit::cells::{orthonormal, remove, scaled};
-use crate::vortex_fit::map_fit::data::{block_means, ends, median, robust_scale};
+use crate::vortex_fit::map_fit::data::{block_means, ends, median};
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
@@ -24,8 +24,6 @@ const PLACES: usize = 26;
 const CLOSEST_M: f64 = 2.0;
 /// Velocities that a search needs.
 const NEEDED: usize = 100;
-/// Least significance: explained sum of squares over the variance of what is left, per number of the pair.
-const SIGNIFICANT: f64 = 60.0;
 
 /// The thinned map: one number per block.
 struct Thinned {
@@ -82,24 +80,21 @@ pub(crate) struct Pair {
 pub(crate) struct Search {
     /// Lateral coordinate and height of each place \[m\].
     places_m: Vec<(f64, f64)>,
-    /// What an anticlockwise vortex of unit circulation at each place shows \[place, block\].
-    shapes: Array2<f64>,
-    /// Products of the shapes with each other and with the data.
+    /// Products of what anticlockwise vortices of unit circulation at the places show, with each other and with the data.
     gram: Array2<f64>,
     towards: Array1<f64>,
-    /// Weighted velocity of each block, 0 without any.
-    data: Array1<f64>,
-    known: Vec<bool>,
 }
 
 /// The best pair of vortices on a grid of places.
 ///
 /// # Errors
-/// [`Error::TooFewVelocities`] with less than a hundred velocities, [`Error::NoVortex`] if no pair stands out.
+/// [`Error::TooFewVelocities`] with less than a hundred velocities, [`Error::NoVortex`] with the statistic `needed` if no pair has the sense of an
+/// aircraft's.
 pub(crate) fn first_guess(
     map: &VelocityMap<'_>,
     model: &WakeModel,
     kernel: &RangeKernel,
+    needed: f64,
 ) -> Result<Wake, Error> {
     let search = Search::new(map, model, kernel)?;
     // the first of equals, whoever computed it
@@ -110,18 +105,11 @@ pub(crate) fn first_guess(
             most
         }
     });
-    let best = best.ok_or(Error::NoVortex {
-        significance: 0.0,
-        needed: SIGNIFICANT,
-    })?;
-    let significance = search.significance(&best);
-    if significance.is_nan() || significance < SIGNIFICANT {
-        return Err(Error::NoVortex {
-            significance,
-            needed: SIGNIFICANT,
-        });
-    }
-    Ok(search.wake(&best))
+    let nothing = Error::NoVortex {
+        statistic: 0.0,
+        needed,
+    };
+    best.map(|best| search.wake(&best)).ok_or(nothing)
 }
 
 impl Search {
@@ -151,20 +139,7 @@ impl Search {
             places_m: seen.iter().map(|(place_m, _)| *place_m).collect(),
             gram: shapes.dot(&shapes.t()),
             towards: shapes.dot(&data),
-            shapes,
-            data,
-            known: thinned.weight.iter().map(|w| *w > 0.0).collect(),
         })
-    }
-
-    /// What a pair explains over the variance of what is left, per number of the pair.
-    fn significance(&self, pair: &Pair) -> f64 {
-        let (left, right) = (self.shapes.row(pair.left), self.shapes.row(pair.right));
-        let rest = (0..self.data.len())
-            .filter(|&i| self.known[i])
-            .map(|i| self.data[i] + pair.strength.0 * left[i] - pair.strength.1 * right[i]);
-        let deviation = robust_scale(rest);
-        pair.explained / (deviation * deviation) / 6.0
     }
 
     /// The wake of a pair, without wind.

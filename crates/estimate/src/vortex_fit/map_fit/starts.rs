@@ -184,6 +184,7 @@ mod tests {
             used: 1000,
             outliers: 0,
             residual_scale: 1.0,
+            statistic: 100.0,
             explained_fraction: 0.9,
             tops: vec![Top { wake, chi2 }],
         }
