@@ -71,12 +71,15 @@ pub(crate) fn samples(array: &Bound<'_, PyAny>) -> PyResult<RawRecords> {
     let bytes: i32 = array.getattr("dtype")?.getattr("itemsize")?.extract()?;
     let source = NumpyRecords(plane.unbind());
     let shape = [records, samples];
-    let out = RawRecords::new(Path::new("signals"), source, shape, kind == "c", are_integers);
-    Ok(RawRecords {
-        zero: match kind.as_str() {
-            "u" if bytes <= 4 => middle_code(8 * bytes),
-            _ => 0.0,
-        },
-        ..out
-    })
+    let mut out = RawRecords::new(
+        Path::new("signals"),
+        source,
+        shape,
+        kind == "c",
+        are_integers,
+    );
+    if kind == "u" && bytes <= 4 {
+        out.zero = middle_code(8 * bytes);
+    }
+    Ok(out)
 }

@@ -6,7 +6,7 @@ use super::words::{
     AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive,
 };
 use crate::io::Provenance;
-use crate::io::scans::{ReadScan, are_of_one_plane, face_alike, plane_numbers};
+use crate::io::scans::{ReadScan, are_of_one_plane, face_alike, plane_numbers, share_origin};
 use crate::outputs::Outputs;
 use crate::plan::Stage;
 use crate::retrieve::{
@@ -163,6 +163,12 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         scans.extend(&mut input.scans.maps);
     }
     face_alike(&mut scans);
+    for path in share_origin(&mut scans) {
+        observer.warn(&format!(
+            "{}: its times count from no date, those of other files do: its scans have no times and are in no track",
+            path.display()
+        ));
+    }
     let planes = plane_numbers(scans.iter().map(|scan| &**scan));
     words
         .folder
@@ -193,7 +199,6 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     if let (true, Some(error)) = (found.scans.is_empty(), refused) {
         return Err(error);
     }
-    same_origin(&mut found.scans);
     found.tracks = retrieve::tracks_of(&found.scans)?;
     let is_of_signals = words.method == Method::Signals
         && found
@@ -259,9 +264,7 @@ fn prediction(before: &[RetrievedScan], scan: &ReadScan) -> Option<Wake> {
             .filter(|one| are_of_one_plane(&one.scan, scan))
     };
     let last = own().next_back()?;
-    let reference = scan.reference.zip(last.scan.reference);
-    let time_s =
-        scan.map.middle_s() + reference.map_or(0.0, |(own, of_last)| own.seconds_since(of_last));
+    let time_s = Some(scan.map.middle_s()).filter(|time_s| time_s.is_finite())?;
     let core_m = last.result.wake.map_or(2.0, |wake| wake.left.core_radius_m);
     retrieve::track_of(own().map(|one| &one.result))
         .ok()
@@ -382,25 +385,6 @@ fn of_signals(
         observer.advance(1);
     }
     Ok(())
-}
-
-/// Times of all scans from the date of the first one, where all have a date.
-fn same_origin(scans: &mut [RetrievedScan]) {
-    let dates: Option<Vec<_>> = scans.iter().map(|scan| scan.scan.reference).collect();
-    let dates = dates.unwrap_or_default();
-    for (scan, date) in scans.iter_mut().zip(&dates) {
-        let later_s = date.seconds_since(dates[0]);
-        scan.scan
-            .map
-            .time_s
-            .iter_mut()
-            .for_each(|time_s| *time_s += later_s);
-        scan.result.reference_time_s += later_s;
-        scan.result
-            .vortices
-            .iter_mut()
-            .for_each(|vortex| vortex.time_s += later_s);
-    }
 }
 
 /// Of the one scene of all scans; those of several scenes have none in common.

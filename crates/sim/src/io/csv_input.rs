@@ -40,6 +40,11 @@ impl TextTable {
     /// As [`TextTable::read`], without the file.
     pub fn parse(text: &str) -> Result<Self, String> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        // A spreadsheet may say its separator in a line of its own.
+        let text = match text.split_once('\n') {
+            Some((first, rest)) if first.starts_with("sep=") => rest,
+            _ => text,
+        };
         let separator = Separator::of(text);
         let mut records = records(text, separator).peekable();
         let are_numbers = |cells: &Vec<String>| {
@@ -104,14 +109,6 @@ impl TextTable {
         let is_same = |column: &String| column.eq_ignore_ascii_case(name);
         let exact = self.header.iter().position(|column| column == name);
         exact.or_else(|| self.header.iter().position(is_same))
-    }
-
-    /// Place of the column of an angle, and its unit, rad: that in radians, or else that in degrees.
-    pub(crate) fn angle(&self, name: &str) -> Option<(usize, f64)> {
-        let in_degrees = || Some((self.column(&format!("{name}_deg"))?, 1f64.to_radians()));
-        self.column(&format!("{name}_rad"))
-            .map(|column| (column, 1.0))
-            .or_else(in_degrees)
     }
 
     /// A cell as a number; NaN where it is empty or none.
@@ -267,6 +264,7 @@ mod tests {
             "a, b\n1.5, 2.5\n3.0, 4.0\n",
             "a;b\n1,5;2,5\n3,0;4,0\n",
             "a\tb\n1.5\t2.5\n3.0\t4.0\n",
+            "sep=;\r\na;b\r\n1,5;2,5\r\n3,0;4,0\r\n",
             "# a b\n1.5 2.5\n3.0 4.0\n",
             "a  b\n 1.5   2.5 \n 3.0   4.0\n",
             "A,B\r1.5,2.5\r3.0,4.0\r",

@@ -5,6 +5,7 @@
 
 use super::netcdf_input::{PACKING, Packing};
 use hdf5_reader::Hdf5File;
+use netcdf_reader::{NcFile, NcValue};
 use std::path::Path;
 
 /// Groups within groups, and groups of one depth, that anybody makes.
@@ -45,6 +46,16 @@ pub(super) fn check_groups(path: &Path, unsound: &'static str) -> Result<Packing
         }
     }
     Err("its groups hold each other, or are nested more than 32 deep")
+}
+
+/// The codes of a variable whose values have names, such as flags and booleans.
+pub(super) fn codes(file: &NcFile, path: &str) -> Option<Vec<f64>> {
+    let values = file.read_variable_user_defined(path).ok()?;
+    let code = |value: &NcValue| match value {
+        NcValue::Enum(named) => Some(named.value.as_i128()? as f64),
+        _ => None,
+    };
+    values.iter().map(code).collect()
 }
 
 /// The last name of a path.

@@ -79,7 +79,7 @@ pub(crate) const Y: Role = Role {
 pub(crate) const Z: Role = Role {
     name: "z",
     axis: "Z",
-    others: "z_face zc zf zh zm zt zw nk nkp1 height altitude zu zu_3d zw_3d bottom_top bottom_top_stag",
+    others: "z_face zc zf zh zm zn zt zw nk nkp1 height altitude zu zu_3d zw_3d bottom_top bottom_top_stag",
 };
 
 /// A NetCDF file, open, or a group of one.
@@ -344,6 +344,11 @@ impl NetcdfFile {
         let Some(variable) = self.variable(name) else {
             return Err(format!("it has no variable {name}"));
         };
+        #[cfg(feature = "netcdf4")]
+        if let (NcType::Enum { .. }, []) = (&variable.dtype, ranges) {
+            let codes = super::netcdf4_input::codes(&self.file, &self.path_of(variable));
+            return codes.ok_or_else(|| format!("variable {name} cannot be read: {UNSOUND_HDF5}"));
+        }
         let is_number = variable.dtype.is_primitive()
             && !matches!(variable.dtype, NcType::Char | NcType::String);
         if !is_number {

@@ -41,7 +41,9 @@ pub(crate) fn begin(path: &Path) -> std::result::Result<(File, u64, Vec<u8>), cr
     match compression(&opened.2) {
         Some((name, program)) => Err(crate::Error::Input {
             path: path.to_owned(),
-            reason: format!("it is compressed with {name}: {program} makes the file that is read"),
+            reason: format!(
+                "it is compressed with {name}: {program} FILE > NEW makes the file that is read"
+            ),
         }),
         None => Ok(opened),
     }
@@ -50,10 +52,10 @@ pub(crate) fn begin(path: &Path) -> std::result::Result<(File, u64, Vec<u8>), cr
 /// The compression that a file begins with, and what undoes it.
 fn compression(beginning: &[u8]) -> Option<(&'static str, &'static str)> {
     match beginning {
-        [0x1F, 0x8B, ..] => Some(("gzip", "gunzip")),
-        [b'B', b'Z', b'h', ..] => Some(("bzip2", "bunzip2")),
-        [0xFD, b'7', b'z', b'X', b'Z', ..] => Some(("xz", "unxz")),
-        [0x28, 0xB5, 0x2F, 0xFD, ..] => Some(("zstd", "unzstd")),
+        [0x1F, 0x8B, ..] => Some(("gzip", "gunzip -c")),
+        [b'B', b'Z', b'h', ..] => Some(("bzip2", "bunzip2 -c")),
+        [0xFD, b'7', b'z', b'X', b'Z', ..] => Some(("xz", "unxz -c")),
+        [0x28, 0xB5, 0x2F, 0xFD, ..] => Some(("zstd", "unzstd -c")),
         _ => None,
     }
 }
@@ -102,7 +104,9 @@ pub(crate) fn read(path: &Path) -> Result<String> {
         return Err(Error::new(ErrorKind::FileTooLarge, reason));
     }
     if let Some((name, program)) = compression(&bytes) {
-        let reason = format!("it is compressed with {name}: {program} makes the file that is read");
+        let reason = format!(
+            "it is compressed with {name}: {program} FILE > NEW makes the file that is read"
+        );
         return Err(Error::new(ErrorKind::InvalidData, reason));
     }
     decode(&bytes).map_err(|at| {
@@ -126,7 +130,7 @@ mod tests {
         std::fs::write(&path, b"seed = \xff\n").unwrap();
         assert!(read(&path).unwrap_err().to_string().contains("byte 8"));
         std::fs::write(&path, b"\x1f\x8b\x08\0").unwrap();
-        assert!(read(&path).unwrap_err().to_string().contains("gunzip"));
+        assert!(read(&path).unwrap_err().to_string().contains("gunzip -c"));
         File::create(&path)
             .unwrap()
             .set_len(LARGEST_BYTES + 1)

@@ -166,7 +166,7 @@ pub fn tracks_of(scans: &[RetrievedScan]) -> Result<Vec<PlaneTrack>, Error> {
     Ok(tracks)
 }
 
-/// The track of scans of one plane in the order of their times; nothing of a single scan, of scans without times, or without a wake.
+/// The track of the scans of one plane that have times, in the order of these; nothing of a single one, or without a wake.
 ///
 /// # Errors
 /// What the filter refuses.
@@ -174,6 +174,7 @@ pub fn track_of<'r>(
     results: impl IntoIterator<Item = &'r ScanResult>,
 ) -> Result<Option<Track>, Error> {
     let mut results: Vec<&ScanResult> = results.into_iter().collect();
+    results.retain(|result| result.reference_time_s.is_finite());
     results.sort_by(|a, b| a.reference_time_s.total_cmp(&b.reference_time_s));
     let increase = results
         .windows(2)

@@ -354,10 +354,12 @@ fn files_of_a_day_that_cannot_be_used_are_skipped_with_the_reason() {
         "ppi.hpl: it has azimuths from",
         "empty.csv: no header",
         "few.csv: sweep 0: ",
+        "b.csv: its times count from no date, those of other files do",
+        "few.csv: its times count from no date",
     ] {
         assert!(warned.contains(part), "{part}: {warned}");
     }
-    assert_eq!(warned.lines().count(), 5, "{warned}");
+    assert_eq!(warned.lines().count(), 7, "{warned}");
     // Nothing is left, or a file is not there at all.
     for (files, part) in [
         (["cut.hpl", "ppi.hpl"], "cut.hpl: it is cut short"),

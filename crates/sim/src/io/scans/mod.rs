@@ -114,6 +114,32 @@ impl ReadScan {
 const NO_RATIO: &str = "it has no signal-to-noise ratio, which --min-snr needs: none of its variables is called snr, cnr, \
                         signal_to_noise_ratio or intensity";
 
+/// Brings the times of scans to the first date from which some of them count; those without a date have no times then, as nothing says
+/// how they lie to the others. Returns the files of these.
+pub fn share_origin(scans: &mut [&mut ReadScan]) -> Vec<PathBuf> {
+    let mut undated = Vec::new();
+    let Some(first) = scans.iter().find_map(|scan| scan.reference) else {
+        return undated;
+    };
+    for scan in scans {
+        let Some(own) = scan.reference else {
+            let has_times = scan.map.time_s.iter().any(|time_s| time_s.is_finite());
+            if has_times && undated.last() != Some(&scan.path) {
+                undated.push(scan.path.clone());
+            }
+            scan.map.time_s.fill(f64::NAN);
+            continue;
+        };
+        let later_s = own.seconds_since(first);
+        scan.map
+            .time_s
+            .iter_mut()
+            .for_each(|time_s| *time_s += later_s);
+        scan.reference = Some(first);
+    }
+    undated
+}
+
 /// What a file or a group of it holds.
 #[derive(Default)]
 struct Found {
@@ -200,3 +226,41 @@ fn text(path: &Path, length: u64, format: &ScanFormat) -> Result<Found, Error> {
 
 /// Largest text that is read \[bytes\].
 const LARGEST_TEXT_BYTES: u64 = 1 << 30;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    #[test]
+    fn times_of_files_count_from_one_date_or_from_none() {
+        let scan = |name: &str, reference: Option<&str>| {
+            let map = ScanMap {
+                elevation_rad: vec![0.1, 0.2],
+                time_s: vec![1.0, 2.0],
+                range_m: vec![300.0],
+                velocity_m_s: Array2::zeros((2, 1)),
+                sigma_m_s: None,
+                fold_m_s: None,
+            };
+            ReadScan {
+                reference: reference.and_then(UtcTime::parse),
+                ..ReadScan::new(Path::new(name), 0, map)
+            }
+        };
+        let mut scans = [
+            scan("a", Some("2024-01-31T12:00:00Z")),
+            scan("b", None),
+            scan("c", Some("2024-01-31T12:01:00Z")),
+        ];
+        let undated = share_origin(&mut scans.iter_mut().collect::<Vec<_>>());
+        assert_eq!(undated, [PathBuf::from("b")]);
+        assert_eq!(scans[0].map.time_s, [1.0, 2.0]);
+        assert!(scans[1].map.time_s.iter().all(|time_s| time_s.is_nan()));
+        assert_eq!(scans[2].map.time_s, [61.0, 62.0]);
+        assert_eq!(scans[2].reference, scans[0].reference);
+        let mut without = [scan("a", None), scan("b", None)];
+        assert!(share_origin(&mut without.iter_mut().collect::<Vec<_>>()).is_empty());
+        assert_eq!(without[1].map.time_s, [1.0, 2.0]);
+    }
+}

@@ -5,6 +5,8 @@
 use crate::Error;
 use crate::io::csv_input::TextTable;
 use crate::io::raw::RawRecords;
+use crate::io::units::Quantity;
+use crate::io::variable::{self, TIME};
 use crate::plan::Plan;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -23,38 +25,33 @@ pub struct RayTable {
 }
 
 impl RayTable {
-    /// Reads `elevation_rad` or `elevation_deg`, and `time_s` where there is one, a row for each record or for each line.
+    /// Reads elevations, and times where there are some, a row for each record or for each line.
     ///
     /// # Errors
     /// A table that cannot be read, without an elevation, or with a cell that is no number.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let table = TextTable::read(path)?;
-        let refuse = |reason: String| Error::Input {
+        Self::of_table(&table, path).map_err(|reason| Error::Input {
             path: path.to_owned(),
             reason,
+        })
+    }
+
+    fn of_table(table: &TextTable, path: &Path) -> Result<Self, String> {
+        let known = |name: &str, values: Vec<f64>| match values.iter().position(|v| !v.is_finite())
+        {
+            Some(row) => Err(format!("row {}: {name} is no number", row + 1)),
+            None => Ok(values),
         };
-        let values = |(column, unit): (usize, f64)| -> Result<Vec<f64>, Error> {
-            let values: Vec<f64> = (0..table.rows.len())
-                .map(|row| unit * table.number(row, column))
-                .collect();
-            match values.iter().position(|value| !value.is_finite()) {
-                Some(row) => Err(refuse(format!(
-                    "row {}: {} is no number",
-                    row + 1,
-                    table.header[column]
-                ))),
-                None => Ok(values),
-            }
+        let (name, elevation_rad) = variable::elevations_rad(table)?
+            .ok_or("it has no column elevation_rad or elevation_deg")?;
+        let time_s = match variable::find(table, &TIME) {
+            Some(name) => Some(known(name, variable::values(table, name, Quantity::Time)?)?),
+            None => None,
         };
-        let missing = || refuse("it has no column elevation_rad or elevation_deg".into());
-        let elevation_rad = values(table.angle("elevation").ok_or_else(missing)?)?;
-        let time_s = table
-            .column("time_s")
-            .map(|column| values((column, 1.0)))
-            .transpose()?;
         Ok(Self {
             path: path.to_owned(),
-            elevation_rad,
+            elevation_rad: known(name, elevation_rad)?,
             time_s,
         })
     }
