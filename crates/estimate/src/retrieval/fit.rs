@@ -95,10 +95,23 @@ fn fit_unfolded(
     )?;
     let cells = all.squares.cells.len();
     let (all, scale) = in_scale(all, least(&ends, cells));
+    let ends = rivals(&ends, scale);
+    finished(all, &ends, scale, &about)
+}
+
+/// The result of rough ends, followed to their end with vortices that move or stand still, and a wake in another wind that explains the
+/// velocities better, with its movement.
+fn finished(
+    all: Stage<'_>,
+    rough: &[End],
+    scale: f64,
+    about: &Wake,
+) -> Result<(ScanResult, Option<(Wake, Movement)>), Error> {
+    let (map, options) = (all.map, all.options);
     let dense = Gates::on_grid(map, options, 1)?;
-    let (moving, frozen) = (dense.clone(), dense.clone().frozen());
+    let frozen = dense.clone().frozen();
     let stage = all.through(&dense);
-    let mut ends = stage.onwards(&rivals(&ends, scale), |_| ROUGH);
+    let mut ends = stage.onwards(rough, |_| ROUGH);
     let may_stand = options.movement == Movement::Auto && dense.seconds.is_some();
     let still = stage.clone().through(&frozen);
     let standing = if may_stand {
@@ -112,17 +125,15 @@ fn fit_unfolded(
         Vec::new()
     };
     let better = aliases::better([(&stage, &ends[..]), (&still, &at_rest)], scale);
-    let fine = if standing.is_some() {
-        frozen.clone()
-    } else {
-        moving
-    }
-    .fine(&options.gate)?;
-    let chosen = if standing.is_some() { &still } else { &stage };
+    let (chosen, gates) = match &standing {
+        Some(_) => (&still, frozen.clone()),
+        None => (&stage, dense.clone()),
+    };
     ends = standing.unwrap_or(ends);
     ends.extend(aliases::rivals(chosen, &ends, scale));
+    let fine = gates.fine(&options.gate)?;
     let stage = stage.through(&fine);
-    let (wind, ends) = (stage.wind(&about)?, stage.fine(&ends));
+    let (wind, ends) = (stage.wind(about)?, stage.fine(&ends));
     let (wind, other_wind_competes) = aliases::best_wind(&stage, wind, scale);
     let mut result = with_alternatives(&Report {
         stage: &stage,

@@ -39,7 +39,7 @@ pub(super) fn each_usable<T>(
 }
 
 /// Whether an error is about the content of a file, and other files can be used all the same.
-fn is_of_the_file(error: &Error) -> bool {
+pub(super) fn is_of_the_file(error: &Error) -> bool {
     match error {
         Error::Input { .. } => true,
         Error::Io { source, .. } => source.kind() != ErrorKind::NotFound,

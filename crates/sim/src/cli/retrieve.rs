@@ -1,7 +1,7 @@
 //! `wakescope retrieve`: vortices from scans, maps of any instrument or signals of a scene.
 
 use super::Cli;
-use super::data_files::each_usable;
+use super::data_files::{each_usable, is_of_the_file};
 use super::words::{
     AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive,
 };
@@ -173,32 +173,10 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     words
         .folder
         .prepare(cli, |files| list(words.method, &planes, None, files))?;
-    let mut found = Found::default();
     let scenes: Vec<_> = inputs.iter().map(|input| input.scene.clone()).collect();
     observer.begin(Stage::Retrieval, planes.len() as u64);
-    let mut refused = None;
-    for Input { scans, scene } in inputs {
-        if let Some(signals) = scans.signals {
-            of_signals(words, scans.maps, signals, &mut found, &*observer)?;
-            continue;
-        }
-        for scan in scans.maps {
-            let start = prediction(&found.scans, &scan);
-            match of_map(words, scene.as_ref(), scan, start, &*observer) {
-                Ok(one) => found.scans.push(one),
-                Err(error) if planes.len() > 1 => {
-                    observer.warn(&format!("{error}: left out"));
-                    refused = refused.or(Some(error));
-                }
-                Err(error) => return Err(error),
-            }
-            observer.advance(1);
-        }
-    }
+    let mut found = of_inputs(words, inputs, planes.len(), &*observer)?;
     observer.end();
-    if let (true, Some(error)) = (found.scans.is_empty(), refused) {
-        return Err(error);
-    }
     found.tracks = retrieve::tracks_of(&found.scans)?;
     let is_of_signals = words.method == Method::Signals
         && found
@@ -216,6 +194,39 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         |files| list(words.method, &planes, Some(&found), files),
         (object, text),
     )
+}
+
+/// What is found in the scans of all files, `count` in number; of several those that cannot be fitted are left out with a warning.
+fn of_inputs(
+    words: &RetrieveWords,
+    inputs: Vec<Input>,
+    count: usize,
+    observer: &dyn Observer,
+) -> Result<Found, Error> {
+    let mut found = Found::default();
+    let mut refused = None;
+    for Input { scans, scene } in inputs {
+        if let Some(signals) = scans.signals {
+            of_signals(words, scans.maps, signals, &mut found, observer)?;
+            continue;
+        }
+        for scan in scans.maps {
+            let start = prediction(&found.scans, &scan);
+            match of_map(words, scene.as_ref(), scan, start, observer) {
+                Ok(one) => found.scans.push(one),
+                Err(error) if count > 1 && is_of_the_file(&error) => {
+                    observer.warn(&format!("{error}: left out"));
+                    refused = refused.or(Some(error));
+                }
+                Err(error) => return Err(error),
+            }
+            observer.advance(1);
+        }
+    }
+    match refused.filter(|_| found.scans.is_empty()) {
+        Some(error) => Err(error),
+        None => Ok(found),
+    }
 }
 
 /// A file, and the scene of its scans where one is known.

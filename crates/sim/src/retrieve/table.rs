@@ -33,8 +33,8 @@ pub(super) fn refused(scan: &ReadScan, error: &wakescope_estimate::Error) -> Err
 /// The number of a scan from 1 on, the scan, and one of its vortices.
 type Row<'a> = (usize, &'a RetrievedScan, Option<&'a VortexResult>);
 
-/// A row for each vortex and scan; a scan without a wake has one row without a vortex.
-pub fn rows(scans: &[RetrievedScan]) -> Table {
+/// Each vortex with its scan; a scan without a wake once, without a vortex.
+fn vortices_of(scans: &[RetrievedScan]) -> Vec<Row<'_>> {
     let mut of: Vec<Row<'_>> = Vec::new();
     for (number, scan) in scans.iter().enumerate() {
         let none = scan.result.vortices.is_empty().then_some(None);
@@ -47,6 +47,12 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
                 .map(|vortex| (number + 1, scan, vortex)),
         );
     }
+    of
+}
+
+/// A row for each vortex and scan; a scan without a wake has one row without a vortex.
+pub fn rows(scans: &[RetrievedScan]) -> Table {
+    let of = vortices_of(scans);
     let of_scan =
         |get: fn(&ScanResult) -> f64| of.iter().map(move |(_, scan, _)| get(&scan.result));
     let time_s =
