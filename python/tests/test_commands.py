@@ -115,6 +115,21 @@ def test_signals_of_every_kind_of_number(kind):
         wakescope.estimate(lines[:, :, ::2], scene)
 
 
+def test_a_reversed_spectrum_is_read_with_towards_and_options_without_effect_are_refused():
+    scene = small(**{"outputs.signals": True})
+    signals = wakescope.run(scene).signals.current_a.values
+    turned = signals * numpy.where(numpy.arange(signals.shape[-1]) % 2, -1.0, 1.0)
+    # The intermediate frequency of 80 MHz is mirrored at a quarter of the sampling rate of 250 MHz.
+    mirrored = small(**{"outputs.signals": True, "detector.intermediate_frequency_hz": 45e6})
+    exact = wakescope.estimate(signals, scene, noise="scene").map
+    found = wakescope.estimate(turned, mirrored, towards=True, noise="scene").map
+    numpy.testing.assert_array_equal(found.radial_velocity, exact.radial_velocity)
+    with pytest.raises(wakescope.WakescopeError, match="--complex has no effect"):
+        wakescope.estimate(signals, scene, complex=True)
+    with pytest.raises(wakescope.WakescopeError, match="--scale has no effect"):
+        wakescope.estimate(signals, scene, scale=2.0, noise="quietest")
+
+
 MEMORY = """
 import resource, numpy, wakescope
 from math import inf

@@ -183,11 +183,11 @@ fn table(fits: &[Fits]) -> Table {
     let mut y = Vec::new();
     let mut z = Vec::new();
     for fits in fits {
-        for method in 0..fits.by_method.len() {
+        for (method, method_name) in METHODS.iter().enumerate().take(fits.by_method.len()) {
             for vortex in [Side::Left, Side::Right] {
                 scan.push(fits.scan as i64);
                 snr_db.push(fits.snr_db);
-                methods.push(METHODS[method]);
+                methods.push(*method_name);
                 vortices.push(name(vortex));
                 let [circulation, lateral, height, _] = vortex.parameters();
                 gamma.push(fits.parameter(method, circulation));

@@ -116,8 +116,11 @@ impl ScanErrors {
     }
 }
 
+/// The errors of the fit of a scan that a rule chooses.
+type ChosenErrors = fn(&ScanErrors) -> &[Errors];
+
 /// Rules by which a fit of a scan is chosen.
-const RULES: [(&str, fn(&ScanErrors) -> &[Errors]); 3] = [
+const RULES: [(&str, ChosenErrors); 3] = [
     ("a pair alone", |scan| &scan.pair),
     ("by the rule", |scan| {
         if scan.shows_secondary {
@@ -346,11 +349,7 @@ fn pair_of_scene(kind: &WakeKind, seed: u64) -> Flow {
 }
 
 /// Mean over the vortices of each scan of a number of the errors of the chosen fit.
-fn means(
-    scans: &[ScanErrors],
-    chosen: fn(&ScanErrors) -> &[Errors],
-    number: fn(&Errors) -> f64,
-) -> Vec<f64> {
+fn means(scans: &[ScanErrors], chosen: ChosenErrors, number: fn(&Errors) -> f64) -> Vec<f64> {
     let mut means = Vec::new();
     for scan in scans {
         let numbers: Vec<f64> = chosen(scan).iter().map(number).collect();

@@ -1,5 +1,6 @@
 //! `wakescope bound` and `wakescope budget`: what the instrument of a scene can measure at best, and its power budget.
 
+use super::options::WITHOUT_OUTPUT;
 use super::{Cli, paths};
 use crate::io::Existing;
 use crate::measure::bound::{bound as of_plan, points};
@@ -28,8 +29,9 @@ pub(super) fn bound(
     overwrite: bool,
     cli: &Cli,
 ) -> Result<(), Error> {
-    if let Some(file) = out {
-        cli.prepare_file(file, Existing::with_overwrite(overwrite))?;
+    match out {
+        Some(file) => cli.prepare_file(file, Existing::with_overwrite(overwrite))?,
+        None => cli.refuse_idle(plan.scene.path(), WITHOUT_OUTPUT)?,
     }
     let found = of_plan(plan, &Silent)?;
     let mut text = found.text();
@@ -57,8 +59,9 @@ pub(super) fn budget(
 ) -> Result<(), Error> {
     let plan = Plan::new(cli.scene(scene)?, Target::Efficiency)?;
     let existing = Existing::with_overwrite(overwrite);
-    if let Some(folder) = out {
-        cli.prepare(folder, &["budget.csv".into()], existing)?;
+    match out {
+        Some(folder) => cli.prepare(folder, &["budget.csv".into()], existing)?,
+        None => cli.refuse_idle(scene, WITHOUT_OUTPUT)?,
     }
     let ranges_m = if range_m.is_empty() {
         scan_ranges_m(&plan.scene.content)

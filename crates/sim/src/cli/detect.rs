@@ -2,7 +2,8 @@
 
 use super::Cli;
 use super::data_files::each_usable;
-use super::words::{AirWords, FolderWords, ScanWords, finite, rate, spacing, stride};
+use super::options::WITHOUT_SCANS;
+use super::words::{AirWords, FolderWords, ScanWords, finite, rate, refuse_idle, spacing, stride};
 use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test,
@@ -57,6 +58,10 @@ pub(super) struct DetectWords {
 }
 
 pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
+    refuse_idle(&words.data, cli)?;
+    if words.data.is_empty() {
+        cli.refuse_idle("detect", WITHOUT_SCANS)?;
+    }
     let observer = cli.observer();
     let stated = words
         .scene

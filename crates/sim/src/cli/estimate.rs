@@ -1,6 +1,7 @@
 //! `wakescope estimate`: velocities from raw signals, simulated or measured.
 
 use super::Cli;
+use super::options::{BESIDE_QUIETEST_GATES, IN_MEMORY};
 use super::words::{FolderWords, noise, positive};
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
@@ -28,6 +29,9 @@ pub(super) struct EstimateWords {
     /// What the numbers are multiplied with, such as ampere per count.
     #[arg(long, value_name = "A", default_value_t = 1.0, value_parser = positive)]
     scale: f64,
+    /// Frequencies rise with velocities towards the lidar: a receiver that mixes the other way, or the second Nyquist zone.
+    #[arg(long)]
+    towards: bool,
     /// Table of elevation_rad or elevation_deg, and time_s, of each record or line.
     #[arg(long, value_name = "FILE.csv")]
     rays: Option<PathBuf>,
@@ -42,13 +46,25 @@ pub(super) struct EstimateWords {
 pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     let scene = cli.scene(&words.scene)?;
     let mut records = match cli.signals(&words.data) {
-        Some(records) => records.not_empty()?,
+        Some(records) => {
+            cli.refuse_idle(&words.data, IN_MEMORY)?;
+            records.not_empty()?
+        }
         None => RawRecords::open(&words.data, &words.format, record_shape(&scene.content))?,
     };
     records.scale = words.scale;
+    records.is_reversed = words.towards;
     let rays = words.rays.as_deref().map(RayTable::read).transpose()?;
     let observer = cli.observer();
     let (plan, is_own) = recorded::plan(scene, &records, &*observer)?;
+    let is_relative = match words.noise {
+        None => !is_own,
+        Some(noise) => noise == NoiseLevel::Quietest,
+    };
+    // Spectra are over the noise of the scene.
+    if is_relative && !words.spectra {
+        cli.refuse_idle(&words.data, BESIDE_QUIETEST_GATES)?;
+    }
     words
         .folder
         .prepare_names(cli, &write::recorded_names(&plan)?)?;

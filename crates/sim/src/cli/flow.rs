@@ -1,6 +1,7 @@
 //! `wakescope flow` and `wakescope wake`: simulations from case files, and of the wake of an aircraft near the ground from presets, on the
 //! processes of `mpirun` or in one.
 
+use super::options::{BESIDE_EXAMPLE, BESIDE_PRINT, WITHOUT_OUTPUT};
 use super::{Cli, paths};
 use crate::Error;
 #[cfg(feature = "plots")]
@@ -32,7 +33,7 @@ pub(super) struct RunArgs {
     check: bool,
     /// End of the run in place of the case's: the age tau of a wake, of other flows a time in seconds.
     #[arg(long, value_name = "END")]
-    end: Option<f64>,
+    pub(super) end: Option<f64>,
     /// Run even if the forecast of the memory is more than the machine has.
     #[arg(long)]
     allow_large: bool,
@@ -45,6 +46,9 @@ pub(super) fn flow(
     run: &RunArgs,
     cli: &Cli,
 ) -> Result<(), Error> {
+    if example_name.is_some() {
+        cli.refuse_idle("--example", BESIDE_EXAMPLE)?;
+    }
     ranked(cli, |ranks| {
         match (example_name.and_then(example), case) {
             (Some(text), _) => print(text, cli, ranks),
@@ -67,14 +71,19 @@ pub(super) fn wake(
     })
 }
 
-/// Runs `wakescope wake --print`: prints the case file.
+/// Runs `wakescope wake --print`: prints the case file, with the end of the command line.
 pub(super) fn print_wake(
     case: Option<&Path>,
     preset: Option<WakePreset>,
+    end: Option<f64>,
     cli: &Cli,
 ) -> Result<(), Error> {
+    cli.refuse_idle("--print", BESIDE_PRINT)?;
     ranked(cli, |ranks| {
-        let file = seeded(wake_file(case, preset, cli)?, cli)?;
+        let mut file = seeded(wake_file(case, preset, cli)?, cli)?;
+        if let Some(end) = end {
+            file = file.with_end(end)?;
+        }
         print(&file.toml, cli, ranks)
     })
 }
@@ -135,6 +144,9 @@ fn simulate(
     ranks: &Arc<dyn Ranks>,
 ) -> Result<(), Error> {
     let is_first = ranks.rank() == 0;
+    if args.out.is_none() {
+        cli.refuse_idle(file.path(), WITHOUT_OUTPUT)?;
+    }
     if let Some(end) = args.end {
         file = file.with_end(end)?;
     }

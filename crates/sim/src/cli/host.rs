@@ -3,6 +3,7 @@
 //!
 //! Check: the files that are kept are those that the command writes, byte for byte.
 
+use super::options::OF_KEPT_FILES;
 use super::output::{as_object, explained, print};
 use super::progress::Bars;
 use super::{Cli, dispatch, with_threads};
@@ -15,7 +16,6 @@ use crate::outputs::{self, List, Outputs};
 use crate::scene::{Outputs as Formats, SceneFile};
 use crate::setup::progress::{Observer, stoppable};
 use crate::sweep::{Request, Sweep};
-use clap::Parser;
 use serde_json::Value;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -92,7 +92,7 @@ pub fn call(words: &[OsString], host: Host) -> Result<Answer, Refusal> {
     let words = [OsString::from("wakescope")]
         .into_iter()
         .chain(words.iter().cloned());
-    let mut cli = Cli::try_parse_from(words).map_err(|error| Refusal(explained(&error)))?;
+    let mut cli = Cli::read(words).map_err(|error| Refusal(explained(&error)))?;
     let call = Arc::new(Call {
         host,
         answer: Mutex::default(),
@@ -212,7 +212,7 @@ impl Cli {
         existing: Existing,
     ) -> Result<(), Error> {
         if self.keeper().is_some() {
-            Ok(())
+            self.refuse_idle("--out", OF_KEPT_FILES)
         } else {
             outputs::prepare(folder, names, existing, true)
         }

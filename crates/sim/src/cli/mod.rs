@@ -10,6 +10,7 @@ mod detect;
 mod estimate;
 mod flow;
 mod host;
+mod options;
 mod output;
 mod progress;
 mod retrieve;
@@ -36,6 +37,7 @@ use wakescope_optics::plan::Model;
 use words::FolderWords;
 
 pub use host::{Answer, Host, Refusal, call, refusal};
+pub use options::command;
 
 /// Simulator of coherent Doppler lidar measurements of aircraft wake vortices.
 #[derive(Parser)]
@@ -58,6 +60,9 @@ struct Cli {
     /// The program that runs the command, and what it gets.
     #[arg(skip)]
     call: Option<Arc<host::Call>>,
+    /// Long names of the options that the command line states.
+    #[arg(skip)]
+    given: Vec<String>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -207,7 +212,7 @@ struct CheckArgs {
 /// Runs the program with the words of its command line, of which the first is its name; returns its exit code.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = words.into_iter().collect();
-    let cli = match Cli::try_parse_from(&words) {
+    let cli = match Cli::read(words.iter().cloned()) {
         Ok(cli) => cli,
         Err(e) => return output::explain(&e, words.iter().any(|word| word == "--json")),
     };
@@ -274,8 +279,8 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
             case,
             preset,
             print: true,
-            ..
-        } => flow::print_wake(case.as_deref(), *preset, cli),
+            run,
+        } => flow::print_wake(case.as_deref(), *preset, run.end, cli),
         Command::Wake {
             case, preset, run, ..
         } => flow::wake(case.as_deref(), *preset, run, cli),
@@ -311,6 +316,13 @@ fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(),
 const AS_ON_INDEPENDENT_PATHS: &str = "; turbulence as on independent paths: one path out and back returns more, by as much as wakescope budget says";
 
 fn check(args: &CheckArgs, cli: &Cli) -> Result<(), Error> {
+    #[cfg(feature = "plots")]
+    let writes = args.out.is_some() || args.picture.is_some();
+    #[cfg(not(feature = "plots"))]
+    let writes = args.out.is_some();
+    if !writes {
+        cli.refuse_idle(&args.scene, options::WITHOUT_OUTPUT)?;
+    }
     let plan = planned(&args.scene, Target::Run, args.allow_large, cli)?;
     let existing = Existing::with_overwrite(args.overwrite);
     if let Some(folder) = &args.out {

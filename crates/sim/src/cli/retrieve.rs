@@ -2,8 +2,13 @@
 
 use super::Cli;
 use super::data_files::{each_usable, is_of_the_file};
+use super::options::{
+    BESIDE_GATE_STD, BESIDE_OWN_SCENE, BY_RADIAL_VELOCITIES, ESTIMATOR_BESIDE_GATE_STD, OF_MEANS,
+    WITHOUT_SCENE, refusal_of_idle,
+};
 use super::words::{
     AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive,
+    refuse_idle,
 };
 use crate::io::Provenance;
 use crate::io::scans::{ReadScan, are_of_one_plane, face_alike, plane_numbers, share_origin};
@@ -37,10 +42,15 @@ pub(super) struct RetrieveWords {
     #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "scene")]
     pulse: Option<f64>,
     /// Length of the estimator's window, s, e.g. 256e-9; of the gates without it.
-    #[arg(long, value_name = "S", value_parser = positive, requires = "estimator")]
+    #[arg(long, value_name = "S", value_parser = positive, requires = "estimator", conflicts_with = "scene")]
     window: Option<f64>,
     /// Weighting of that window, as in scenes; rectangular without it.
-    #[arg(long, value_name = "WORD", requires = "estimator")]
+    #[arg(
+        long,
+        value_name = "WORD",
+        requires = "estimator",
+        conflicts_with = "scene"
+    )]
     weighting: Option<String>,
     /// How circulations are found.
     #[arg(long, value_enum, default_value_t)]
@@ -59,9 +69,9 @@ pub(super) struct RetrieveWords {
     /// Whether vortices move while a scan lasts: whichever fits better, yes, or no.
     #[arg(long, value_enum, default_value_t = Movement::Auto)]
     motion: Movement,
-    /// Least gain of chi-square over the wind alone that makes a wake.
-    #[arg(long, value_name = "T", default_value_t = RetrievalOptions::DEFAULT_THRESHOLD, value_parser = not_negative)]
-    threshold: f64,
+    /// Least gain of chi-square over the wind alone that makes a wake; 22, or 35 of what an estimator shows.
+    #[arg(long, value_name = "T", value_parser = not_negative)]
+    threshold: Option<f64>,
     /// Height of the lidar above the ground, m; of the scene without it, else 0.
     #[arg(long, value_name = "M", value_parser = not_negative)]
     lidar_height: Option<f64>,
@@ -78,6 +88,52 @@ const WIDE_HZ: f64 = 500e6;
 const HEIGHTS: &str = "fits of signals state the deviations of heights a quarter too small\n";
 
 impl RetrieveWords {
+    /// Refuses options that have no effect on the files or beside other options.
+    fn refuse_idle(&self, cli: &Cli) -> Result<(), Error> {
+        refuse_idle(&self.data, cli)?;
+        if self.scene.is_none() {
+            cli.refuse_idle("retrieve", WITHOUT_SCENE)?;
+        }
+        if self.method == Method::Rv {
+            cli.refuse_idle("--method rv", BY_RADIAL_VELOCITIES)?;
+        }
+        let are_means = self.estimator.as_deref() == Some(MEANS);
+        if are_means {
+            cli.refuse_idle("--estimator means", OF_MEANS)?;
+        }
+        if let Some(std_m) = self.air.gate_std {
+            cli.refuse_idle("--gate-std", BESIDE_GATE_STD)?;
+            if !are_means || std_m == 0.0 {
+                cli.refuse_idle("--gate-std", ESTIMATOR_BESIDE_GATE_STD)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses options that have no effect on a scan with velocities of a kind.
+    fn refuse_idle_on(&self, scan: &ReadScan, velocities: Velocities<'_>) -> Result<(), Error> {
+        let has_turbulence = self.air.turbulence.is_some();
+        let (name, reason) = match velocities {
+            _ if self.motion != Movement::Auto && !scan.map.has_times() => {
+                ("motion", "its lines have no times")
+            }
+            Velocities::Shown(_) if has_turbulence => (
+                "turbulence",
+                "what the estimator shows of a wake is fitted with independent errors; those of means may be shared",
+            ),
+            Velocities::Means | Velocities::Unknown
+                if has_turbulence && self.secondary.is_some() =>
+            {
+                (
+                    "secondary",
+                    "of velocities that share turbulence a pair alone is fitted: leave out --turbulence",
+                )
+            }
+            _ => return Ok(()),
+        };
+        Err(refusal_of_idle(&scan.path, name, reason))
+    }
+
     fn options(&self, scene: Option<&SceneFile>, gate: Gate) -> RetrievalOptions {
         let mut options = retrieve::options(scene.map(|file| &file.content), gate, self.core);
         if let Some(profile) = self.profile {
@@ -89,7 +145,8 @@ impl RetrieveWords {
         RetrievalOptions {
             turbulence: self.air.turbulence,
             movement: self.motion,
-            threshold: self.threshold,
+            threshold: self.threshold.unwrap_or(options.threshold),
+            threshold_of_estimates: self.threshold.unwrap_or(options.threshold_of_estimates),
             ..options
         }
     }
@@ -105,7 +162,7 @@ impl RetrieveWords {
         let number = |value: f64| Some(format!("{value:?}"));
         state(
             "pulse.shape.duration_s",
-            self.pulse.or(scan.pulse_width_s).and_then(number),
+            scan.pulse_width_s.and_then(number),
         );
         if let Some(method) = &self.estimator {
             let gate_s = scan
@@ -149,6 +206,7 @@ struct Found {
 }
 
 pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
+    words.refuse_idle(cli)?;
     let stated = words
         .scene
         .as_deref()
@@ -158,6 +216,9 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     let mut inputs = each_usable(&words.data, &*observer, |path| {
         Input::read(words, path, stated.as_ref(), &*observer)
     })?;
+    for input in &inputs {
+        input.refuse_idle(words, cli)?;
+    }
     let mut scans: Vec<&mut ReadScan> = Vec::new();
     for input in &mut inputs {
         scans.extend(&mut input.scans.maps);
@@ -236,6 +297,17 @@ struct Input {
 }
 
 impl Input {
+    /// Refuses options in whose place the scene of the file is taken.
+    fn refuse_idle(&self, words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
+        let states_estimator = words.estimator.as_deref().is_some_and(|name| name != MEANS);
+        match self.scans.maps.first() {
+            Some(scan) if self.scene.is_some() && !states_estimator => {
+                cli.refuse_idle(&scan.path, BESIDE_OWN_SCENE)
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn read(
         words: &RetrieveWords,
         path: &Path,
@@ -292,10 +364,11 @@ const UNKNOWN: &str = "velocities are taken for means over the gates: those of s
 fn of_map(
     words: &RetrieveWords,
     scene: Option<&SceneFile>,
-    scan: ReadScan,
+    mut scan: ReadScan,
     start: Option<Wake>,
     observer: &dyn Observer,
 ) -> Result<RetrievedScan, Error> {
+    scan.pulse_width_s = words.pulse.or(scan.pulse_width_s);
     let are_means = words.estimator.as_deref() == Some(MEANS) || words.air.gate_std == Some(0.0);
     // What is stated goes before what the file says.
     let (instrument, is_likely) = match (words.air.gate_std, &words.estimator, scene) {
@@ -318,6 +391,7 @@ fn of_map(
         None if are_means => Velocities::Means,
         None => Velocities::Unknown,
     };
+    words.refuse_idle_on(&scan, velocities)?;
     let options = RetrievalOptions {
         start,
         ..words.options(scene, gate)
@@ -358,6 +432,7 @@ fn of_signals(
     let mut first_line = 0;
     for (mut scan, measured) in maps.into_iter().zip(&scans) {
         scan.azimuth_rad = Some(plan.scene.content.scan.azimuth_rad);
+        words.refuse_idle_on(&scan, velocities)?;
         let (gate, _) = gate_of(Some(&scan), words.air.gate_std, Some(&plan.scene.content))?;
         let (mut one, implausible) = retrieve::retrieve_map(
             scan,

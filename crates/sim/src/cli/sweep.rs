@@ -1,5 +1,6 @@
 //! `wakescope sweep`: design studies.
 
+use super::options::{BESIDE_MERGE, OF_MERGED_WITHOUT_SCENE};
 use super::{Cli, paths};
 use crate::io::Existing;
 use crate::sweep::{Request, Settings, Sweep, merge, run};
@@ -29,6 +30,10 @@ pub(super) fn sweep(
     cli: &Cli,
 ) -> Result<(), Error> {
     let Some(sweep) = cases.filter(|_| folders.is_empty()) else {
+        cli.refuse_idle("--merge", BESIDE_MERGE)?;
+        if cases.is_none() {
+            cli.refuse_idle("--merge", OF_MERGED_WITHOUT_SCENE)?;
+        }
         let existing = Existing::with_overwrite(settings.overwrite);
         let files = merge(folders, cases, out, existing)?;
         let text = format!("wrote {} files to {}", files.len(), out.display());

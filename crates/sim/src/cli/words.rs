@@ -1,6 +1,7 @@
 //! What words of several commands have in common: where files go, scans that are read, and how numbers are written.
 
 use super::Cli;
+use super::options::{ON_SIGNALS, ON_VELOCITIES, refusal_of_idle};
 use super::output::paths;
 use crate::io::netcdf_input;
 use crate::io::raw::{RawFormat, RawRecords};
@@ -91,7 +92,7 @@ pub(super) struct ScanWords {
     /// The variable or column that holds the velocities.
     #[arg(long, value_name = "NAME")]
     field: Option<String>,
-    /// Velocities are positive towards the lidar.
+    /// Velocities are positive towards the lidar; raw signals: frequencies rise with velocities towards it.
     #[arg(long)]
     towards: bool,
     /// Leave out velocities below this signal-to-noise ratio, dB.
@@ -158,7 +159,12 @@ impl ScanWords {
         let mut records =
             RawRecords::open(path, &RawFormat::default(), record_shape(&scene.content))?;
         records.scale = self.scale.unwrap_or(1.0);
+        records.is_reversed = self.towards;
         let (plan, is_own) = recorded::plan(scene.clone(), &records, observer)?;
+        if is_own && self.scale.is_some() {
+            let reason = "signals of a simulation are in ampere";
+            return Err(refusal_of_idle(path, "scale", reason));
+        }
         let noise = if is_own || self.scale.is_some() {
             NoiseLevel::OfScene
         } else {
@@ -188,6 +194,19 @@ impl ScanWords {
             }),
         })
     }
+}
+
+/// Refuses options of scans that have no effect on the files that are given.
+pub(super) fn refuse_idle(data: &[PathBuf], cli: &Cli) -> Result<(), Error> {
+    for path in data {
+        let idle = if is_signals(path) {
+            ON_SIGNALS
+        } else {
+            ON_VELOCITIES
+        };
+        cli.refuse_idle(path, idle)?;
+    }
+    Ok(())
 }
 
 /// Whether a file holds raw signals and no map.

@@ -46,9 +46,9 @@ fn column(path: &Path, name: &str) -> Vec<u64> {
         .collect()
 }
 
-/// The samples of `signals.nc`, record after record, and the samples of one.
-fn samples(folder: &Path) -> (Vec<f64>, usize) {
-    let mut file = netcdf3::FileReader::open(folder.join("o/signals.nc")).unwrap();
+/// The samples of a `signals.nc`, record after record, and the samples of one.
+pub(super) fn samples(path: &Path) -> (Vec<f64>, usize) {
+    let mut file = netcdf3::FileReader::open(path).unwrap();
     let samples = file.data_set().dim_size("time").unwrap();
     (file.read_var_f64("current_a").unwrap(), samples)
 }
@@ -242,7 +242,7 @@ fn largest_difference_m_s(folder: &Path, maps: [&str; 2]) -> f64 {
 fn the_zero_of_a_converter_moves_no_velocity() {
     let temp = recorded_run("");
     let folder = temp.path();
-    let (currents, _) = samples(folder);
+    let (currents, _) = samples(&folder.join("o/signals.nc"));
     let largest = currents
         .iter()
         .fold(0.0_f64, |most, one| most.max(one.abs()));
@@ -310,7 +310,7 @@ fn the_zero_of_a_converter_moves_no_velocity() {
 #[test]
 fn every_format_and_order_gives_the_velocities_of_the_run() {
     let temp = recorded_run("");
-    let (all, samples) = samples(temp.path());
+    let (all, samples) = samples(&temp.path().join("o/signals.nc"));
     let one = &all[..all.len() / 3];
     let rows = one.len() / samples;
     let bytes = |at: &dyn Fn(usize) -> f64| {
@@ -509,6 +509,78 @@ fn complex_signals_and_spectra_on_request() {
     }
 }
 
+/// The spectrum of a receiver that mixes the other way is reversed: its intermediate frequency is
+/// mirrored at a quarter of the sampling rate, complex samples are conjugates.
+#[test]
+fn a_receiver_that_mixes_the_other_way_gives_the_same_velocities() {
+    let turned = [
+        ("", "[detector]\nintermediate_frequency_hz = 45e6\n"),
+        (
+            "[detector]\nsignal = \"baseband\"\n",
+            "[detector]\nsignal = \"baseband\"\n",
+        ),
+    ];
+    for (detector, turned) in turned {
+        let temp = recorded_run(detector);
+        let folder = temp.path();
+        let is_complex = !detector.is_empty();
+        let (mut all, count) = samples(&folder.join("o/signals.nc"));
+        let records = all.len() / count;
+        let mut shape = vec![records, count];
+        if is_complex {
+            let mut file = netcdf3::FileReader::open(folder.join("o/signals.nc")).unwrap();
+            let second = file.read_var_f64("quadrature_a").unwrap();
+            all = all
+                .iter()
+                .zip(second)
+                .flat_map(|(re, im)| [*re, im])
+                .collect();
+            shape.push(2);
+        }
+        fs::write(folder.join("plain.npy"), npy(false, &shape, &all)).unwrap();
+        for (index, value) in all.iter_mut().enumerate() {
+            let sample = if is_complex { index } else { index % count };
+            if sample % 2 == 1 {
+                *value = -*value;
+            }
+        }
+        fs::write(folder.join("turned.npy"), npy(false, &shape, &all)).unwrap();
+        let scene = fs::read_to_string(folder.join("s.toml")).unwrap();
+        let scene = scene.replace(detector, "") + turned;
+        fs::write(folder.join("turned.toml"), scene).unwrap();
+        let estimate = |data: &str, scene: &str, more: &[&str]| {
+            let file = format!("{data}.npy");
+            let words = [
+                "estimate", &file, "--scene", scene, "--out", data, "--quiet",
+            ];
+            let pairs: &[&str] = if is_complex { &["--complex"] } else { &[] };
+            let out = wakescope(folder, &[&words, pairs, more].concat());
+            assert!(out.status.success(), "{out:?}");
+            let map = folder.join(data).join("map.csv");
+            ["v_mean_m_s", "snr_db"].map(|name| column(&map, name))
+        };
+        let plain = estimate("plain", "s.toml", &[]);
+        assert_eq!(plain, estimate("turned", "turned.toml", &["--towards"]));
+        fs::remove_dir_all(folder.join("turned")).unwrap();
+        let reversed = estimate("turned", "turned.toml", &[]);
+        let sums =
+            [&plain[0], &reversed[0]].map(|v| v.iter().map(|v| f64::from_bits(*v)).sum::<f64>());
+        assert!(sums[0] * sums[1] < 0.0, "{sums:?}");
+    }
+}
+
+/// An array of doubles as numpy.save writes it.
+pub(super) fn npy(is_fortran: bool, shape: &[usize], values: &[f64]) -> Vec<u8> {
+    let order = if is_fortran { "True" } else { "False" };
+    let shape: String = shape.iter().map(|length| format!("{length},")).collect();
+    let header = format!("{{'descr': '<f8', 'fortran_order': {order}, 'shape': ({shape}), }}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.bytes());
+    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    bytes
+}
+
 /// A record of `samples` real numbers of white noise for each line, as bytes of a binary file.
 fn noise_bytes(count: usize, seed: u64, also: impl Fn(usize) -> f64) -> Vec<u8> {
     use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -617,7 +689,7 @@ fn the_quietest_gates_tell_the_noise_for_any_number_of_lines() {
 fn missing_samples_of_any_kind_cost_their_windows_alone() {
     let temp = recorded_run("");
     let folder = temp.path();
-    let (all, samples) = samples(folder);
+    let (all, samples) = samples(&folder.join("o/signals.nc"));
     let level = |name: &str, words: &[&str]| -> Vec<f64> {
         let mut every = vec![
             "estimate",
@@ -718,7 +790,7 @@ fn with_all_samples(nc: &[u8], all: &[f64], value: f64) -> Vec<u8> {
 }
 
 /// An archive of arrays of doubles as numpy.savez writes it, without checksums.
-fn npz(arrays: &[(&str, &[f64], &[usize])]) -> Vec<u8> {
+pub(super) fn npz(arrays: &[(&str, &[f64], &[usize])]) -> Vec<u8> {
     let (mut out, mut table) = (Vec::new(), Vec::new());
     for (name, values, shape) in arrays {
         let shape: Vec<String> = shape.iter().map(|length| format!("{length},")).collect();
@@ -782,7 +854,7 @@ fn npz(arrays: &[(&str, &[f64], &[usize])]) -> Vec<u8> {
 fn signals_that_are_none_are_refused_and_nothing_is_written() {
     let temp = recorded_run("");
     let folder = temp.path();
-    let (all, samples) = samples(folder);
+    let (all, samples) = samples(&folder.join("o/signals.nc"));
     let one: Vec<f64> = all[..all.len() / 3].to_vec();
     let binary = |scale: f64| {
         one.iter()

@@ -113,7 +113,11 @@ fn signals_of_an_array_give_the_map_of_those_of_a_file() {
         )
     };
     let array = |scale: f64| of(scale, records);
-    let words = |data| ["estimate", data, "--scene", "scene", "--out", "."];
+    let words = |data| {
+        [
+            "estimate", data, "--scene", "scene", "--noise", "scene", "--out", ".",
+        ]
+    };
     let of_file = run(&words(npy.to_str().unwrap()), SCENE, None, true).unwrap();
     let of_array = run(&words("signals"), SCENE, Some(array(1.0)), true).unwrap();
     assert_eq!(of_array.files, of_file.files);

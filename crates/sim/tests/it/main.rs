@@ -22,6 +22,8 @@ mod hostile_files;
 #[cfg(feature = "cli")]
 mod messages;
 #[cfg(all(feature = "cli", feature = "plots"))]
+mod options;
+#[cfg(all(feature = "cli", feature = "plots"))]
 mod planes;
 mod receiver;
 #[cfg(all(feature = "cli", feature = "plots"))]

@@ -397,10 +397,7 @@ fn the_scan_of_a_weather_radar_is_no_wake_and_the_reason_is_given() {
     }
     fs::write(folder.join("radar.csv"), rows).unwrap();
     for method in ["fit", "rv"] {
-        let (table, warned) = retrieved(
-            folder,
-            &["radar.csv", "--method", method, "--estimator", "means"],
-        );
+        let (table, warned) = retrieved(folder, &["radar.csv", "--method", method]);
         assert_eq!(
             (table.rows.len(), text(&table, 0, "side")),
             (1, "none"),

@@ -61,6 +61,42 @@ pub struct RawFormat {
     pub quadrature: Option<String>,
 }
 
+impl RawFormat {
+    /// Refuses options that have no effect on a file that begins with `magic`.
+    fn refuse_unused(&self, magic: &[u8], shape: RecordShape) -> Result<(), String> {
+        let is_binary = self.number.is_some();
+        let is_netcdf = !is_binary && (magic.starts_with(b"CDF") || magic.starts_with(b"\x89HDF"));
+        let is_npy = !is_binary && magic.starts_with(b"\x93NUM");
+        let has_bytes = matches!(self.number.as_deref(), Some("i8" | "u8"));
+        let unused = [
+            (
+                self.variable.is_some() && (is_binary || is_npy),
+                "--variable has no effect: it holds one array",
+            ),
+            (
+                self.quadrature.is_some() && !is_netcdf,
+                "--quadrature has no effect: it names a variable of a NetCDF file; --complex says that numbers are pairs",
+            ),
+            (
+                self.byte_order != ByteOrder::default() && has_bytes,
+                "--byte-order has no effect: a number has one byte",
+            ),
+            (
+                self.order != Order::default() && is_netcdf,
+                "--order has no effect: samples run fastest in a NetCDF file, then the other dimensions in their order",
+            ),
+            (
+                self.order == Order::PulseMajor && shape.pulses_per_line == 1,
+                "--order has no effect: the scene has one pulse a line",
+            ),
+        ];
+        match unused.iter().find(|(is_unused, _)| *is_unused) {
+            Some((_, reason)) => Err((*reason).into()),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Kinds of the numbers of binary files.
 #[cfg(feature = "cli")]
 const KINDS: [&str; 8] = ["i8", "u8", "i16", "u16", "i32", "u32", "f32", "f64"];
@@ -126,6 +162,9 @@ pub struct RawRecords {
     pub scale: f64,
     /// Samples of this size and above are missing.
     pub outsized: f64,
+    /// Whether frequencies rise with velocities towards the lidar; samples are read with their
+    /// spectrum reversed.
+    pub is_reversed: bool,
     /// What the file says of them.
     pub about: About,
 }
@@ -134,13 +173,15 @@ impl RawRecords {
     /// Opens a file; only its header is read.
     ///
     /// # Errors
-    /// A file that cannot be read, is damaged, has another shape than its header says or needs words that `format` lacks.
+    /// A file that cannot be read, is damaged, has another shape than its header says or needs words that `format` lacks; an option
+    /// of `format` that has no effect on a file of its kind.
     pub fn open(path: &Path, format: &RawFormat, shape: RecordShape) -> Result<Self, Error> {
         let refuse = |reason: String| Error::Input {
             path: path.to_owned(),
             reason,
         };
         let (mut file, length, magic) = text_file::begin(path)?;
+        format.refuse_unused(&magic, shape).map_err(refuse)?;
         let numbers = Numbers {
             path,
             format,
@@ -162,7 +203,20 @@ impl RawRecords {
                     .into(),
             ),
         };
-        found.map_err(refuse)?.not_empty()
+        let found = found.map_err(refuse)?.not_empty()?;
+        if format.complex && format.number.is_none() {
+            let without = RawFormat {
+                complex: false,
+                ..format.clone()
+            };
+            if Self::open(path, &without, shape)?.is_complex == found.is_complex {
+                return Err(refuse(
+                    "--complex has no effect: its last index does not run over pairs of numbers"
+                        .into(),
+                ));
+            }
+        }
+        Ok(found)
     }
 
     /// Records of so many samples that a source has; `are_integers` says that the numbers are codes of a converter.
@@ -190,6 +244,7 @@ impl RawRecords {
             zero: 0.0,
             scale: 1.0,
             outsized: f64::INFINITY,
+            is_reversed: false,
             about: About::default(),
         }
     }
@@ -236,6 +291,8 @@ impl RawRecords {
         records: Range<usize>,
         samples: Range<usize>,
     ) -> Result<Vec<Complex<f64>>, Error> {
+        let first_sample = samples.start;
+        let count = samples.len();
         let mut found = self
             .source
             .read(records, samples)
@@ -260,7 +317,24 @@ impl RawRecords {
                 sample.re = f64::NAN;
             }
         }
+        if self.is_reversed {
+            for record in found.chunks_mut(count.max(1)) {
+                self.reverse_spectrum(record, first_sample);
+            }
+        }
         Ok(found)
+    }
+
+    /// Reverses the spectrum of consecutive samples of a record: the conjugate of complex samples;
+    /// real ones at index n times (-1)^n, which moves a frequency f to half the sampling rate less f.
+    fn reverse_spectrum(&self, record: &mut [Complex<f64>], first_sample: usize) {
+        for (index, sample) in record.iter_mut().enumerate() {
+            if self.is_complex {
+                *sample = sample.conj();
+            } else if (first_sample + index) % 2 == 1 {
+                *sample = -*sample;
+            }
+        }
     }
 }
 
@@ -334,6 +408,12 @@ impl Numbers<'_> {
         let is_fortran = stored.fortran_order && lengths.len() > 1;
         if is_fortran && (pairs || lengths.len() > 2) {
             return Err("it is an array in the order of Fortran: numpy.ascontiguousarray makes one that is read".into());
+        }
+        if is_fortran && format.order != Order::default() {
+            return Err(
+                "--order has no effect: the array says itself that it is in the order of Fortran"
+                    .into(),
+            );
         }
         let order = if is_fortran {
             Order::SampleMajor

@@ -218,6 +218,9 @@ fn text(path: &Path, length: u64, format: &ScanFormat) -> Result<Found, Error> {
         .take(60)
         .any(|line| line.trim_start().starts_with("****"));
     match is_hpl {
+        true if format.field.is_some() => {
+            Err("--field has no effect: a HALO file has one column of velocities".into())
+        }
         true => hpl::scans(&text, path, format),
         false => table::scans(&text, path, format),
     }

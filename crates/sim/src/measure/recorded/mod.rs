@@ -85,8 +85,9 @@ pub fn record_shape(scene: &Scene) -> RecordShape {
     }
 }
 
-/// The plan for the records of a file: that of the scene with as many repetitions as the file has, and whether the truth of the
-/// scene is that of the records. The observer is warned of keys of the file's scene that are skipped.
+/// The plan for the records of a file: that of the scene with as many repetitions as the file has, its receiver mirrored where the
+/// spectrum of the records is reversed, and whether the truth of the scene is that of the records. The observer is warned of keys
+/// of the file's scene that are skipped.
 ///
 /// # Errors
 /// As [`Plan::new`]; records of another shape or kind than the scene's, recorded otherwise than it says; signals of the same
@@ -97,11 +98,16 @@ pub fn plan(
     observer: &dyn Observer,
 ) -> Result<(Plan, bool), Error> {
     fits(&scene.content, records)?;
+    let scene = if records.is_reversed {
+        mirrored(scene)?
+    } else {
+        scene
+    };
     let whole = scan_lines::schedule(&scene)?.pulses();
-    let own = records
-        .about
-        .scene_toml
-        .as_deref()
+    // The truth of a scene is not that of its signals with another sign of the velocities.
+    let of_run = records.about.scene_toml.as_deref();
+    let own = of_run
+        .filter(|_| !records.is_reversed)
         .and_then(|toml| SceneFile::embedded(toml, &records.path).ok())
         .filter(|(own, _)| signals_of(&own.content) == signals_of(&scene.content));
     if let Some((own, warning)) = &own {
@@ -132,6 +138,19 @@ pub fn plan(
         scene.with(own)?
     };
     Ok((Plan::new(file, Target::Map)?, is_own))
+}
+
+/// The scene whose receiver records signals with the reversed spectrum: the intermediate frequency of
+/// real samples is mirrored at a quarter of the sampling rate, complex samples remain about zero.
+fn mirrored(scene: SceneFile) -> Result<SceneFile, Error> {
+    if scene.content.detector.signal == DetectorSignal::Baseband {
+        return Ok(scene);
+    }
+    let mut content = scene.content.clone();
+    let detector = &mut content.detector;
+    detector.intermediate_frequency_hz =
+        0.5 * detector.sampling_hz - detector.intermediate_frequency_hz;
+    Ok(scene.with(content)?)
 }
 
 /// A scene without what is done with its signals.
