@@ -126,8 +126,6 @@ def test_a_reversed_spectrum_is_read_with_towards_and_options_without_effect_are
     numpy.testing.assert_array_equal(found.radial_velocity, exact.radial_velocity)
     with pytest.raises(wakescope.WakescopeError, match="--complex has no effect"):
         wakescope.estimate(signals, scene, complex=True)
-    with pytest.raises(wakescope.WakescopeError, match="--scale has no effect"):
-        wakescope.estimate(signals, scene, scale=2.0, noise="quietest")
 
 
 MEMORY = """

@@ -1,7 +1,7 @@
 //! `wakescope estimate`: velocities from raw signals, simulated or measured.
 
 use super::Cli;
-use super::options::{BESIDE_QUIETEST_GATES, IN_MEMORY};
+use super::options::IN_MEMORY;
 use super::words::{FolderWords, noise, positive};
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
@@ -57,14 +57,6 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     let rays = words.rays.as_deref().map(RayTable::read).transpose()?;
     let observer = cli.observer();
     let (plan, is_own) = recorded::plan(scene, &records, &*observer)?;
-    let is_relative = match words.noise {
-        None => !is_own,
-        Some(noise) => noise == NoiseLevel::Quietest,
-    };
-    // Spectra are over the noise of the scene.
-    if is_relative && !words.spectra {
-        cli.refuse_idle(&words.data, BESIDE_QUIETEST_GATES)?;
-    }
     words
         .folder
         .prepare_names(cli, &write::recorded_names(&plan)?)?;

@@ -51,13 +51,6 @@ pub(super) const IN_MEMORY: &Idle = &[
 ];
 const ARRAY: &str = "an array says itself how its numbers stand";
 
-/// Beside noise that is measured in the samples themselves.
-pub(super) const BESIDE_QUIETEST_GATES: &Idle = &[(
-    "scale",
-    "the noise of the quietest gates has the unit of the samples, and all results are ratios: --noise scene compares with \
-     the noise of the receiver, in ampere",
-)];
-
 /// Of the method of radial velocities.
 pub(super) const BY_RADIAL_VELOCITIES: &Idle = &[
     (

@@ -207,11 +207,6 @@ const KINDS: &[Kind] = &[
         "table.csv --turbulence 0.5,25 --out out",
         &["secondary"],
     ),
-    some(
-        "retrieve",
-        "o/map.nc --turbulence 0.5,25 --out out",
-        &["secondary"],
-    ),
     all("bound", "tiny.toml"),
     all("bound", "tiny.toml --out bound.csv"),
     all("budget", "tiny.toml"),
@@ -566,7 +561,9 @@ fn idle(definition: &clap::Command, place: &Place<'_>, kind: &Kind) -> Vec<Strin
             continue;
         };
         let long = format!("--{option}");
-        let is_meant = kind.options.is_empty() || kind.options.contains(&option);
+        // The scale states the unit of the samples, on which ratios to their own noise do not depend.
+        let is_unit = (kind.command, option) == ("estimate", "scale") && kind.options.is_empty();
+        let is_meant = !is_unit && (kind.options.is_empty() || kind.options.contains(&option));
         if IS_OF_THE_PROGRAM.contains(&option) || !is_meant || base.contains(&long.as_str()) {
             continue;
         }
