@@ -1,10 +1,13 @@
 use super::*;
 use std::collections::BTreeMap;
 
+/// Attributes by their names.
+type Attributes = Vec<(&'static str, &'static str)>;
+
 /// Variables with their attributes, and their numbers or texts.
 #[derive(Default)]
 struct Given {
-    variables: BTreeMap<&'static str, (Vec<(&'static str, &'static str)>, Values)>,
+    variables: BTreeMap<&'static str, (Attributes, Values)>,
     texts: Vec<(&'static str, &'static str)>,
 }
 
