@@ -142,7 +142,6 @@ const KINDS: &[Kind] = &[
         "estimate",
         "pairs.npy --complex --scene complex.toml --out out",
     ),
-    all("estimate", "one.npy --scene one.toml --out out"),
     some(
         "estimate",
         "signals.npy --noise scene --scene s.toml --out out",
@@ -370,12 +369,6 @@ fn inputs() -> TempDir {
         "[detector]\nsignal = \"baseband\"\n[detector.snr]",
     );
     write("complex.toml", complex.as_bytes());
-    write(
-        "one.toml",
-        SCENE
-            .replace("pulses_per_line = 2", "pulses_per_line = 1")
-            .as_bytes(),
-    );
     let fine = SCENE
         .replace("elevation_step_rad = 5e-3", "elevation_step_rad = 4e-3")
         .replace("range_max_m = 470.0", "range_max_m = 480.0");
@@ -437,12 +430,6 @@ fn inputs() -> TempDir {
         .flat_map(|(re, im)| [*re, *im])
         .collect();
     write("pairs.npy", &npy(false, &[records, count, 2], &pairs));
-    let first_pulses: Vec<f64> = all
-        .chunks(2 * count)
-        .flat_map(|line| &line[..count])
-        .copied()
-        .collect();
-    write("one.npy", &npy(false, &[records / 2, count], &first_pulses));
     let mut rays = String::from("elevation_rad\n");
     for line in 0..records / 2 {
         rays += &format!("{}\n", 0.05 + 0.005 * line as f64);

@@ -63,7 +63,7 @@ pub struct RawFormat {
 
 impl RawFormat {
     /// Refuses options that have no effect on a file that begins with `magic`.
-    fn refuse_unused(&self, magic: &[u8], shape: RecordShape) -> Result<(), String> {
+    fn refuse_unused(&self, magic: &[u8]) -> Result<(), String> {
         let is_binary = self.number.is_some();
         let is_netcdf = !is_binary && (magic.starts_with(b"CDF") || magic.starts_with(b"\x89HDF"));
         let is_npy = !is_binary && magic.starts_with(b"\x93NUM");
@@ -84,10 +84,6 @@ impl RawFormat {
             (
                 self.order != Order::default() && is_netcdf,
                 "--order has no effect: samples run fastest in a NetCDF file, then the other dimensions in their order",
-            ),
-            (
-                self.order == Order::PulseMajor && shape.pulses_per_line == 1,
-                "--order has no effect: the scene has one pulse a line",
             ),
         ];
         match unused.iter().find(|(is_unused, _)| *is_unused) {
@@ -181,7 +177,7 @@ impl RawRecords {
             reason,
         };
         let (mut file, length, magic) = text_file::begin(path)?;
-        format.refuse_unused(&magic, shape).map_err(refuse)?;
+        format.refuse_unused(&magic).map_err(refuse)?;
         let numbers = Numbers {
             path,
             format,
