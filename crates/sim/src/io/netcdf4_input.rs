@@ -3,7 +3,7 @@
 //! Check: groups in circles and values that no file of that length holds are refused; a field that another program compressed in chunks
 //! gives the wind that it was sampled from.
 
-use super::netcdf_input::{PACKING, Packing};
+use super::number::{PACKING, Packing};
 use hdf5_reader::Hdf5File;
 use netcdf_reader::{NcFile, NcValue};
 use std::path::Path;

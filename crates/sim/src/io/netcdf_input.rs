@@ -6,6 +6,7 @@
 //! round. Nothing of a file is repeated in a message but short names and units. Check: the readers of initial fields and of cross-planes read back what the writers wrote; files of another hand, damaged
 //! ones, and each word of a good header replaced by large and negative counts in the tests below.
 
+use crate::io::number::{PACKING, Packing};
 use crate::io::units::{Quantity, split_date};
 use crate::{Error, io::text_file, machine};
 use ndarray::{ArrayD, Axis};
@@ -17,7 +18,6 @@ use netcdf_reader::{
 };
 #[cfg(feature = "netcdf4")]
 use netcdf_reader::{NcMetadataMode, NcOpenOptions};
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -99,9 +99,6 @@ pub(crate) struct NetcdfFile {
     /// Names of the attributes that say how numbers are packed, by the path of their variable, as HDF5 has them.
     packing: Arc<Packing>,
 }
-
-/// Names of attributes by the path of their variable.
-pub(super) type Packing = BTreeMap<String, Vec<String>>;
 
 impl std::fmt::Debug for NetcdfFile {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -687,18 +684,6 @@ impl NetcdfFile {
         Ok(stored.permuted_axes(axes).iter().copied().collect())
     }
 }
-
-/// Attributes that say which numbers stand for which values, and which for none.
-pub(super) const PACKING: [&str; 8] = [
-    "_FillValue",
-    "_Unsigned",
-    "add_offset",
-    "missing_value",
-    "scale_factor",
-    "valid_max",
-    "valid_min",
-    "valid_range",
-];
 
 /// Filters of HDF5 that files of instruments have, by their registered numbers.
 const FILTERS: [(&str, &str); 8] = [

@@ -2,6 +2,23 @@
 //!
 //! Check: every kind comes back from its bytes in both orders.
 
+use std::collections::BTreeMap;
+
+/// Attributes that say which numbers stand for which values, and which for none.
+pub(super) const PACKING: [&str; 8] = [
+    "_FillValue",
+    "_Unsigned",
+    "add_offset",
+    "missing_value",
+    "scale_factor",
+    "valid_max",
+    "valid_min",
+    "valid_range",
+];
+
+/// Names of attributes by the path of their variable.
+pub(super) type Packing = BTreeMap<String, Vec<String>>;
+
 /// How a number is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct NumberType {

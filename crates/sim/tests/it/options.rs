@@ -530,7 +530,7 @@ fn idle(definition: &clap::Command, place: &Place<'_>, kind: &Kind) -> Vec<Strin
     let nothing = Files::new();
     let fresh = place.given(&nothing, &base);
     assert!(
-        kind.before != "" || fresh.0 != Some(2),
+        !kind.before.is_empty() || fresh.0 != Some(2),
         "{}: {}",
         base.join(" "),
         String::from_utf8_lossy(&fresh.1)
