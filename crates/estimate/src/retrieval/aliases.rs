@@ -1,7 +1,7 @@
-//! Winds beyond the interval in which velocities are told apart.
+//! Winds beyond the Nyquist interval.
 //!
 //! Velocities that repeat after the width F are explained by a wind w, and nearly as well by w + n F / cos(elevation): the cosine's change
-//! over the scan alone tells these aliases apart. The wind without vortices is fitted from starts all over the winds there are; the
+//! over the scan alone distinguishes these aliases. The wind without vortices is fitted from starts over all possible winds; the
 //! fit of the wake begins with the best of them and compares the others at its end.
 //! Check: winds of several intervals in narrow and wide sectors, and over the zenith.
 

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `scan_map`, `options`, `result` | what goes in, how, what comes out |
 //! | `fit`, `hypotheses`, `report` | fits of wind alone, one vortex and two; which it is; deviations and flags |
-//! | `aliases` | winds beyond the interval in which velocities are told apart |
+//! | `aliases` | winds beyond the Nyquist interval |
 //! | `plausible` | what the vortices of an aircraft can be |
 //! | `gates`, `whitening` | what a velocity is of the air; correlated velocities |
 //! | `secondary` | the fit again with secondary vortices, if the scan shows them |

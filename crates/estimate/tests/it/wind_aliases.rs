@@ -1,4 +1,4 @@
-//! Winds beyond the interval in which velocities are told apart.
+//! Winds beyond the Nyquist interval.
 
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng};

@@ -254,7 +254,7 @@ fn norm(a: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::Silent;
-    use crate::flow::plane_vortices;
+    use crate::flow::plane_vortices_for_tests;
     use std::f64::consts::PI;
     use std::path::Path;
 
@@ -276,8 +276,8 @@ mod tests {
 
     #[test]
     fn the_errors_of_decaying_vortices_match_those_from_the_closed_form() {
-        let field = plane_vortices::folder();
-        let own = plane_vortices::case(
+        let field = plane_vortices_for_tests::folder();
+        let own = plane_vortices_for_tests::case(
             &field,
             32,
             0.005,

@@ -69,7 +69,7 @@ pub(super) struct RetrieveWords {
     /// Whether vortices move while a scan lasts: whichever fits better, yes, or no.
     #[arg(long, value_enum, default_value_t = Movement::Auto)]
     motion: Movement,
-    /// Least gain of chi-square over the wind alone that makes a wake; 22, or 35 of what an estimator shows.
+    /// Detection threshold: minimum drop in chi-square relative to a wind-only fit; 22, or 35 for maps of a known estimator.
     #[arg(long, value_name = "T", value_parser = not_negative)]
     threshold: Option<f64>,
     /// Height of the lidar above the ground, m; of the scene without it, else 0.

@@ -3,7 +3,7 @@
 use super::*;
 use crate::flow::WakePreset;
 use crate::flow::files::CASE;
-use crate::flow::plane_vortices;
+use crate::flow::plane_vortices_for_tests;
 use crate::setup::progress::Silent;
 use std::fs;
 use tempfile::TempDir;
@@ -25,7 +25,7 @@ fn parse(text: &str) -> CaseFile {
 /// Vortices that turn for ever where nothing damps them.
 fn vortices(field: &TempDir, viscosity_m2_s: f64, time: &str) -> CaseFile {
     let sections = format!("[time]\nlongest_step_s = 1.0\n{time}[checkpoint]\nevery_steps = 10\n");
-    plane_vortices::case(field, 16, viscosity_m2_s, &sections)
+    plane_vortices_for_tests::case(field, 16, viscosity_m2_s, &sections)
 }
 
 fn check(
@@ -43,7 +43,7 @@ fn a_second_run_in_a_folder_is_refused_and_what_a_crashed_one_left_is_swept() {
     fs::create_dir_all(stage.join("new")).unwrap();
     fs::create_dir_all(stage.join("old")).unwrap();
     fs::write(stage.join("lock"), "").unwrap();
-    let field = plane_vortices::folder();
+    let field = plane_vortices_for_tests::folder();
     let case = vortices(&field, 0.01, "end_s = 0.05\n");
     let lock = FolderLock::take(folder.path()).unwrap();
     let error = run(&case, folder.path(), Begin::New, &Silent)
@@ -68,7 +68,7 @@ fn a_run_killed_before_its_first_checkpoint_begins_anew_and_says_so() {
     // What such a run leaves: the head of its table and half a row.
     let half = format!("# source: {}\nstep,time_s\n1,0.0", crate::PROGRAM);
     fs::write(folder.path().join("steps.csv"), half).unwrap();
-    let field = plane_vortices::folder();
+    let field = plane_vortices_for_tests::folder();
     let case = vortices(&field, 0.01, "end_s = 0.05\n");
     let notes = Notes::default();
     let outcome = run(&case, folder.path(), Begin::Restart, &notes).unwrap();
@@ -136,7 +136,7 @@ fn the_ages_of_outputs_follow_the_end_of_a_wake() {
         ended(own, 0.4),
         (vec![0.2], vec![0.2, 0.4], Some([0.1, 0.4]))
     );
-    let field = plane_vortices::folder();
+    let field = plane_vortices_for_tests::folder();
     let plane = vortices(&field, 0.01, "end_s = 0.5\n")
         .with_end(0.25)
         .unwrap();
@@ -151,7 +151,7 @@ fn the_ages_of_outputs_follow_the_end_of_a_wake() {
 #[test]
 fn energy_from_nowhere_stops_a_run_whose_checkpoints_are_good() {
     let folder = tempfile::tempdir().unwrap();
-    let field = plane_vortices::folder();
+    let field = plane_vortices_for_tests::folder();
     let case = vortices(
         &field,
         0.0,
@@ -195,7 +195,7 @@ fn energy_from_nowhere_stops_a_run_whose_checkpoints_are_good() {
 fn a_run_goes_on_with_the_scheme_of_its_checkpoint() {
     let folder = tempfile::tempdir().unwrap();
     // Cells of Reynolds number 42: damped at a Courant number of 0.2, not at 0.35.
-    let field = plane_vortices::folder();
+    let field = plane_vortices_for_tests::folder();
     let case = |time: &str| vortices(&field, 0.0015, time);
     let scheme = |file: &CaseFile| {
         Setup::new(&file.content, file.folder())
@@ -348,7 +348,7 @@ fn a_seed_of_the_command_line_is_that_of_the_noise_and_of_the_files() {
     assert!(seeded.toml.contains("seed = 7\n") && seeded.provenance().seed == 7);
     assert_eq!(tiny_wake("", "").with_seed(7).unwrap().toml, seeded.toml);
     assert_eq!(tiny_wake("", "").provenance().seed, 0);
-    let field = plane_vortices::folder();
+    let field = plane_vortices_for_tests::folder();
     let error = vortices(&field, 0.01, "end_s = 0.1\n")
         .with_seed(7)
         .unwrap_err()

@@ -8,7 +8,8 @@
 //! Check: a field written by a run reads back to the same values; a smooth field on another mesh with fourth order.
 
 use crate::Error;
-use crate::io::netcdf_input::{NetcdfFile, X, Y, Z, open};
+use crate::io::netcdf_dimensions::{X, Y, Z};
+use crate::io::netcdf_input::{NetcdfFile, open};
 use std::path::Path;
 use wakescope_les::solver::Ends;
 use wakescope_les::{Direction, Mesh};

@@ -16,7 +16,7 @@ mod initial_file;
 mod integration;
 mod kind;
 #[cfg(test)]
-pub(crate) mod plane_vortices;
+pub(crate) mod plane_vortices_for_tests;
 #[cfg(test)]
 mod ranks_tests;
 mod setup;

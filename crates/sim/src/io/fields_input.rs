@@ -5,7 +5,8 @@
 
 use crate::Error;
 use crate::io::edges;
-use crate::io::netcdf_input::{NetcdfFile, TIME, X, Y, Z, open};
+use crate::io::netcdf_dimensions::{TIME, X, Y, Z};
+use crate::io::netcdf_input::{NetcdfFile, open};
 use crate::io::{UtcTime, variable};
 use std::path::{Path, PathBuf};
 use wakescope_les::winds::{Edges, VolumeComponent};

@@ -18,7 +18,7 @@
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`parts`] | (data) files in parts, for ranks that write them together | - |
 //! | [`atomic`] | files to disk, all or none | - |
-//! | `text_file`, `netcdf_input` (`netcdf4_input`), `planes_input`, `fields_input`, `units` | (readers) texts, NetCDF, cross-planes and fields in it, units | `netcdf` or `netcdf4` but for texts |
+//! | `text_file`, `netcdf_input` (`netcdf4_input`), `netcdf_dimensions`, `planes_input`, `fields_input`, `units` | (readers) texts, NetCDF, cross-planes and fields in it, units | `netcdf` or `netcdf4` but for texts |
 //! | `lock` | nothing: one writer for a folder at a time | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
 //! | `cfradial`, `cf_planes`, `cf_fields`, `cf_signals`, `cf_spectra` (through `netcdf`; their variables are described beside them in `.cdl`) | classic NetCDF | `netcdf` |
@@ -27,6 +27,7 @@ pub mod atomic;
 pub(crate) mod fields_input;
 #[cfg(feature = "netcdf4")]
 pub(crate) mod netcdf4_input;
+pub(crate) mod netcdf_dimensions;
 pub(crate) mod netcdf_input;
 pub(crate) mod planes_input;
 pub(crate) mod text_file;

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::io::netcdf::{Data, Layout, Variable};
+use crate::io::netcdf_dimensions::{TIME, Z};
 use crate::io::planes_input;
 
 /// Name, dimensions, text attributes and values of a variable.

@@ -91,7 +91,7 @@ impl NumberType {
     }
 }
 
-/// The middle one of all codes of so many bits without sign.
+/// The middle code of an unsigned converter of `bits` bits.
 pub fn middle_code(bits: i32) -> f64 {
     2f64.powi(bits - 1)
 }

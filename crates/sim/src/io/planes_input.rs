@@ -6,7 +6,8 @@
 //! Check: what was written comes back; files that lack something are refused by name.
 
 use crate::Error;
-use crate::io::netcdf_input::{NetcdfFile, TIME, Y, Z, open};
+use crate::io::netcdf_dimensions::{TIME, Y, Z};
+use crate::io::netcdf_input::{NetcdfFile, open};
 use crate::io::{CrossPlanes, OPEN_EDGES, edges};
 use ndarray::Array3;
 use std::path::{Path, PathBuf};

@@ -159,7 +159,7 @@ pub(crate) const TIME: Known = Known {
     names: "time timestamp",
     standard_names: &["time"],
 };
-/// The largest velocity that can be told apart.
+/// Nyquist velocities: half the interval after which velocities repeat.
 pub(crate) const NYQUIST: Known = Known {
     names: "nyquist_velocity nyquist nyquist_vel nqv unambiguous_velocity",
     standard_names: &[],

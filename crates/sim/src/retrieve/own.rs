@@ -96,13 +96,14 @@ impl SceneResponse {
                 Some((self.of_blind_search(pair, map, &options.model), options))
             }
             (Err(wakescope_estimate::Error::NoVortex { statistic, needed }), 0) => {
-                Some((calm(found, statistic, needed), options.clone()))
+                Some((without_wake(found, statistic, needed), options.clone()))
             }
             (Err(_), _) => None,
         }
     }
 
-    /// A pair that stands out of the wind where means show no vortex: told if both are in view and more likely than not.
+    /// A pair that stands out of the wind where means show no vortex: its vortices are reported if both are in view and each circulation
+    /// exceeds its standard error.
     fn of_blind_search(
         &self,
         mut pair: ScanResult,
@@ -114,11 +115,11 @@ impl SceneResponse {
             0.5 * self.scene.estimator.window_samples as f64 * self.scene.sample_spacing_m();
         let [near_m, far_m] = ends_m(&map.range_m);
         let range_m = [near_m - half_window_m, far_m + half_window_m];
-        let is_told = |vortex: &VortexResult| {
+        let is_reported = |vortex: &VortexResult| {
             model.sees((&map.elevation_rad, &range_m), vortex.place_m()) && is_likely(vortex)
         };
-        if !pair.vortices.iter().all(is_told) {
-            return untold(pair);
+        if !pair.vortices.iter().all(is_reported) {
+            return without_vortices(pair);
         }
         let are_certain = pair.vortices.iter().all(is_certain);
         pair.set(Flag::Uncertain, !are_certain);
@@ -237,13 +238,13 @@ fn ends_m(axis_m: &[f64]) -> [f64; 2] {
     [axis_m.first(), axis_m.last()].map(|end| end.copied().unwrap_or(f64::NAN))
 }
 
-/// Whether a circulation is at least as large as its deviation.
+/// Whether a circulation exceeds its standard error.
 fn is_likely(vortex: &VortexResult) -> bool {
     vortex.circulation_m2_s.value > vortex.circulation_m2_s.std
 }
 
 /// The result of a scan in which no pair stands out of the wind by the least statistic that is needed.
-fn calm(found: &ScanResult, statistic: f64, needed: f64) -> ScanResult {
+fn without_wake(found: &ScanResult, statistic: f64, needed: f64) -> ScanResult {
     let mut result = ScanResult {
         statistic,
         threshold: needed,
@@ -254,8 +255,8 @@ fn calm(found: &ScanResult, statistic: f64, needed: f64) -> ScanResult {
     result
 }
 
-/// The result of a wake that stands out of the wind while its vortices are not known.
-fn untold(result: ScanResult) -> ScanResult {
+/// The result of a wake that stands out of the wind, without its vortices, of which too little is known.
+fn without_vortices(result: ScanResult) -> ScanResult {
     let mut result = telling(result, |_| false);
     result.wake = None;
     result.set(Flag::Uncertain, true);

@@ -384,7 +384,7 @@ impl Survey {
 
 /// Fewest records that show whether their mean is none of chance.
 const FEWEST_RECORDS: usize = 16;
-/// Standard errors by which the mean of so many records is beyond chance (Student's distribution, once in 10^8).
+/// Standard errors that the mean of [`FEWEST_RECORDS`] records exceeds by chance once in 10^8 (Student's distribution).
 const SURE: f64 = 12.0;
 
 /// The offset of a converter: the mean of the records, where it is far beyond what their scatter leaves to chance.
@@ -401,7 +401,7 @@ fn constant_offset(means: &[f64]) -> Option<f64> {
 
 /// The largest part of all samples, the outsized ones left out from here on; refuses records without any, and codes that the
 /// scene's converter does not have. A constant offset of real samples of an instrument is subtracted from here on, as no frequency of
-/// the band is 0; about 0 Hz, where complex samples have their band, it cannot be told from an echo.
+/// the band is 0; about 0 Hz, where complex samples have their band, it cannot be distinguished from an echo.
 fn largest_part(
     plan: &Plan,
     is_own: bool,
