@@ -4,12 +4,12 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
-use wakescope_estimate::{Gates, PeriodogramOptions, PeriodogramPlan, Sampling, map::*};
+use wakescope_estimate::{Gates, PeriodogramPlan, Sampling, map::*};
 
 fn map(criterion: &mut Criterion) {
     let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap();
     let gates = Gates::new(64, 1, 2e-6).unwrap();
-    let plan = PeriodogramPlan::<f64>::new(&sampling, 64, &PeriodogramOptions::default()).unwrap();
+    let plan = PeriodogramPlan::<f64>::new(&sampling, 64).unwrap();
     // 200 lines of sight of 200 windows; deterministic rubbish in place of noise
     let records = Array2::from_shape_fn((200, 263), |(ray, n)| {
         let x = (ray as f64 * 78.233 + n as f64 * 12.9898).sin() * 43_758.545;

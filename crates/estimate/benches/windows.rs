@@ -18,7 +18,7 @@ fn window() -> Vec<f64> {
 
 fn windows(criterion: &mut Criterion) {
     let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap();
-    let plan = PeriodogramPlan::<f64>::new(&sampling, 64, &PeriodogramOptions::default()).unwrap();
+    let plan = PeriodogramPlan::<f64>::new(&sampling, 64).unwrap();
     let (real, mut scratch) = (window(), Scratch::new());
     let complex: Vec<_> = real.iter().map(|x| Complex::new(*x, 0.5 * x)).collect();
     let mut lags = vec![0.0; 64];

@@ -9,8 +9,8 @@
 use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate::{
-    Error, Estimator, GateVelocity, Gates, PeriodogramOptions, PeriodogramPlan, Radius, Sampling,
-    Scan, Scratch, Statistic, estimators::Quality, polar_points,
+    Error, Estimator, GateVelocity, Gates, PeriodogramPlan, Radius, Sampling, Scan, Scratch,
+    Statistic, estimators::Quality, polar_points,
 };
 
 /// Lags 1 and 2 of complex windows: the phase of the second is finer, the first says in which turn it is.
@@ -82,11 +82,7 @@ fn main() -> Result<(), Error> {
         sampling,
         window_samples: gates.window_samples,
     };
-    let plan = PeriodogramPlan::<Complex<f64>>::new(
-        &sampling,
-        gates.window_samples,
-        &PeriodogramOptions::default(),
-    )?;
+    let plan = PeriodogramPlan::<Complex<f64>>::new(&sampling, gates.window_samples)?;
     let scans = (
         Scan::new(&own, &sampling, &gates, &elevation_rad, records.view())?,
         Scan::new(

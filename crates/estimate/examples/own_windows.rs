@@ -10,8 +10,8 @@ use std::error::Error;
 use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate::{
-    Gates, PeriodogramOptions, PeriodogramPlan, Radius, Sampling, Scan, map::WindowCorrelation,
-    polar_points, window::Sample,
+    Gates, PeriodogramPlan, Radius, Sampling, Scan, map::WindowCorrelation, polar_points,
+    window::Sample,
 };
 
 /// What an instrument's data sheet says: adapt these lines to your own.
@@ -81,11 +81,7 @@ fn made_up() -> Result<Vec<Vec<f64>>, wakescope_estimate::Error> {
 /// Velocity in steps of a quarter of a gate, each averaged over 2 m along the line of sight.
 fn print<S: Sample>(record: Vec<S>, sampling: &Sampling) -> Result<(), Box<dyn Error>> {
     let gates = Gates::new(64, 1, 0.0)?;
-    let plan = PeriodogramPlan::<S>::new(
-        sampling,
-        gates.window_samples,
-        &PeriodogramOptions::default(),
-    )?;
+    let plan = PeriodogramPlan::<S>::new(sampling, gates.window_samples)?;
     let records = Array2::from_shape_vec((1, record.len()), record)?;
     let elevation_rad = [0.0];
     let scan = Scan::new(

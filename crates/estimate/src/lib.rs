@@ -7,11 +7,11 @@
 //! wake vortices seen by a coherent Doppler lidar; "corrected" marks a departure from its print.
 //!
 //! ```
-//! use wakescope_estimate::{PeriodogramOptions, PeriodogramPlan, Sampling, Scratch};
+//! use wakescope_estimate::{PeriodogramPlan, Sampling, Scratch};
 //!
 //! // 250 MHz sampling, target at rest at 80 MHz, 1.55 um, detector band 55 .. 105 MHz
 //! let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6))?;
-//! let plan = PeriodogramPlan::<f64>::new(&sampling, 64, &PeriodogramOptions::default())?;
+//! let plan = PeriodogramPlan::<f64>::new(&sampling, 64)?;
 //! // a tone from a target that recedes at 3 m/s, with a disturbance elsewhere in the band
 //! let turn = |f_hz: f64, n: usize| std::f64::consts::TAU * f_hz * n as f64 / 250e6;
 //! let frequency_hz = sampling.frequency_hz(3.0);
@@ -60,6 +60,7 @@ mod error;
 pub mod estimators;
 mod linalg;
 pub mod map;
+mod measured;
 pub mod models;
 mod parallel;
 pub mod retrieval;
@@ -71,9 +72,9 @@ pub mod window;
 
 pub use error::Error;
 pub use estimators::{
-    Estimator, GateVelocity, PeriodogramOptions, PeriodogramPlan, Refinement, SpectralPeak,
-    Statistic,
+    Estimator, GateVelocity, PeriodogramPlan, Refinement, SpectralPeak, Statistic,
 };
 pub use map::{Radius, Scan, polar_points};
+pub use measured::Measured;
 pub use spectrum::Correlogram;
 pub use window::{Gates, Sampling, Scratch, SignalKind, Weighting};

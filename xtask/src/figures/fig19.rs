@@ -1,8 +1,9 @@
 //! Figure 19: detection of wakes in maps, operating curves and the smallest circulation that is found against range.
 
 use super::context::*;
+use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{ScanMap, Turbulence};
-use wakescope_estimate::wake_detection::{DetectorOptions, Share};
+use wakescope_estimate::wake_detection::DetectorOptions;
 use wakescope_sim::detection::{
     Calibration, DetectionSettings, Power, SceneNoise, detect, strided,
 };
@@ -138,7 +139,7 @@ fn alarms(plan: &Plan, noise: &SceneNoise, scans: usize, rate: f64) -> Result<Es
     let (found, _) = detect(&maps, &settings, &Silent)?;
     let alarms = found.iter().filter(|scan| scan.is_wake()).count();
     let rate_error = (rate * (1.0 - rate) / maps.len() as f64).sqrt();
-    let share = Share::of(alarms, maps.len());
+    let share = Measured::share(alarms, maps.len());
     Ok(Estimate::stated(share.value, rate_error))
 }
 
@@ -164,9 +165,9 @@ fn table(cases: &[Case]) -> Table {
         of_row.push(case);
         gamma_m2_s.push(case.power.smallest_m2_s.0);
         false_alarm.push(FALSE_ALARM);
-        shares.push(Share {
+        shares.push(Measured {
             value: 0.9,
-            standard_error: f64::NAN,
+            std: f64::NAN,
         });
     }
     Table::new()
@@ -177,10 +178,7 @@ fn table(cases: &[Case]) -> Table {
         .float("gamma_m2_s", gamma_m2_s)
         .float("false_alarm", false_alarm)
         .float("detection", column(&shares, |share| share.value))
-        .float(
-            "standard_error",
-            column(&shares, |share| share.standard_error),
-        )
+        .float("standard_error", column(&shares, |share| share.std))
         .float(
             "sigma_gamma_m2_s",
             column(&of_row, |case| case.power.circulation_std_m2_s),

@@ -16,8 +16,9 @@ use rayon::prelude::*;
 use serde::Deserialize;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
+use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{
-    Flag, Gate, Measured, RetrievalOptions, ScanMap, ScanResult, expected_velocities, fit_scan,
+    Flag, Gate, RetrievalOptions, ScanMap, ScanResult, expected_velocities, fit_scan,
     with_secondary_vortices,
 };
 use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Secondary, Vortex, Wake};

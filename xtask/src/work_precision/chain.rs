@@ -5,8 +5,9 @@ use super::{Found, Row, few, settings};
 use crate::cost::fastest;
 use fixtures::failure::Failure;
 use std::path::Path;
+use wakescope_estimate::Measured;
 use wakescope_sim::accuracy::keys::{REALISATIONS, WINDOW_STEP, with};
-use wakescope_sim::accuracy::metrics::{Metric, Shift};
+use wakescope_sim::accuracy::metrics::Metric;
 use wakescope_sim::accuracy::{Report, Request, Setting};
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::run;
@@ -30,7 +31,7 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let noise = given
         .shift(Metric::Std)
         .ok_or_else(|| lacking(REALISATIONS))?;
-    let of_one = noise.standard_error * given.value.sqrt();
+    let of_one = noise.std * given.value.sqrt();
     let mut rows = Vec::new();
     for row in &setting(&report, WINDOW_STEP)?.rows {
         // The gates that are left say nothing of the map.
@@ -45,7 +46,7 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
 fn rows_of_step(
     file: &SceneFile,
     step: f64,
-    shift: Option<Shift>,
+    shift: Option<Measured>,
     of_one: f64,
     quick: bool,
 ) -> Result<Vec<Row>, Failure> {
@@ -69,10 +70,10 @@ fn rows_of_step(
             let Some(shift) = shift else {
                 return Ok(Found::exact(f64::NAN, cost));
             };
-            let error = shift.shift.hypot(of_one / count.sqrt());
+            let error = shift.value.hypot(of_one / count.sqrt());
             Ok(Found {
                 error,
-                standard_error: (shift.shift / error * shift.standard_error).abs(),
+                standard_error: (shift.value / error * shift.std).abs(),
                 cost,
                 set_up_s: 0.0,
             })

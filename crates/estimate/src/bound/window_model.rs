@@ -244,73 +244,6 @@ pub(crate) fn turned(cycles: f64, lag: f64) -> f64 {
     std::f64::consts::TAU * (product - product.round() + rest)
 }
 
-/// Carrier of a velocity and noise at the lags of a window: what makes the covariance of its samples from the envelope of the signal.
-struct Carrier {
-    window_samples: usize,
-    /// Carrier and noise of the lags from -(N - 1) to N - 1.
-    lags: Vec<[Complex<f64>; 2]>,
-    phase_slope: f64,
-}
-
-impl Carrier {
-    /// For a signal of mean power `power`, `snr` times that of the noise in the detector band.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] if `snr` is not above 0 or the velocity not finite; [`Error::Band`] for an impossible band.
-    fn new(
-        (sampling, noise): (&Sampling, Noise),
-        window_samples: usize,
-        velocity_m_s: f64,
-        (power, snr): (f64, f64),
-        kind: SignalKind,
-    ) -> Result<Self, Error> {
-        positive("snr", snr)?;
-        finite("velocity_m_s", velocity_m_s)?;
-        sampling.validate_for(kind)?;
-        let cycles = sampling.frequency_hz(velocity_m_s) * sampling.period_s();
-        let bandwidth = (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz;
-        let density = power / (snr * bandwidth);
-        let longest = window_samples as i64 - 1;
-        let of_lag = |lag: i64| {
-            let lag = lag as f64;
-            [
-                Complex::from_polar(1.0, turned(cycles, lag)),
-                noise.covariance(sampling, lag, kind) * density,
-            ]
-        };
-        let lags = (-longest..=longest).map(of_lag).collect();
-        Ok(Self {
-            window_samples,
-            lags,
-            phase_slope: sampling.phase_slope(),
-        })
-    }
-
-    fn at(&self, (n, m): (usize, usize)) -> &[Complex<f64>; 2] {
-        &self.lags[n + self.window_samples - 1 - m]
-    }
-
-    /// Signal of that envelope on the carrier.
-    fn signal(&self, envelope: &Array2<f64>) -> Array2<Complex<f64>> {
-        Array2::from_shape_fn(envelope.dim(), |place| self.at(place)[0] * envelope[place])
-    }
-
-    /// Covariance of signal and noise.
-    fn covariance(&self, mut signal: Array2<Complex<f64>>) -> Array2<Complex<f64>> {
-        signal
-            .indexed_iter_mut()
-            .for_each(|(place, value)| *value += self.at(place)[1]);
-        signal
-    }
-
-    /// Derivative of that with respect to velocity \[per m/s\].
-    fn by_velocity(&self, signal: &Array2<Complex<f64>>) -> Array2<Complex<f64>> {
-        let turn =
-            |(n, m): (usize, usize)| Complex::new(0.0, self.phase_slope * (n as f64 - m as f64));
-        Array2::from_shape_fn(signal.dim(), |place| signal[place] * turn(place))
-    }
-}
-
 /// Second-order model of a window: signal envelope, carrier, and noise at a given SNR.
 ///
 /// R(n, m) = envelope(n, m) exp(j 2 pi f (t_n - t_m)) + noise, with f from (30); real samples take the real part.
@@ -407,20 +340,35 @@ impl WindowModel {
         snr: f64,
         kind: SignalKind,
     ) -> Result<[Array2<Complex<f64>>; 2], Error> {
-        let (power, samples) = (
-            self.envelope.diag().mean().unwrap_or(0.0),
-            self.envelope.nrows(),
-        );
-        let carrier = Carrier::new(
-            (&self.sampling, self.noise),
-            samples,
-            velocity_m_s,
-            (power, snr),
-            kind,
-        )?;
-        let signal = carrier.signal(&self.envelope);
-        let derivative = carrier.by_velocity(&signal);
-        Ok([carrier.covariance(signal), derivative])
+        positive("snr", snr)?;
+        finite("velocity_m_s", velocity_m_s)?;
+        let sampling = &self.sampling;
+        sampling.validate_for(kind)?;
+        let samples = self.envelope.nrows();
+        let power = self.envelope.diag().mean().unwrap_or(0.0);
+        let cycles = sampling.frequency_hz(velocity_m_s) * sampling.period_s();
+        let bandwidth = (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz;
+        let density = power / (snr * bandwidth);
+        // At the lags from -(N - 1) to N - 1.
+        let mut carrier = Vec::with_capacity(2 * samples);
+        let mut noise = Vec::with_capacity(2 * samples);
+        let longest = samples as i64 - 1;
+        for lag in -longest..=longest {
+            let lag = lag as f64;
+            carrier.push(Complex::from_polar(1.0, turned(cycles, lag)));
+            noise.push(self.noise.covariance(sampling, lag, kind) * density);
+        }
+        let phase_slope = sampling.phase_slope();
+        let mut covariance = Array2::zeros(self.envelope.dim());
+        let mut derivative = Array2::zeros(self.envelope.dim());
+        for ((n, m), &envelope) in self.envelope.indexed_iter() {
+            let lag = n + samples - 1 - m;
+            let signal = carrier[lag] * envelope;
+            let turn = Complex::new(0.0, phase_slope * (n as f64 - m as f64));
+            covariance[(n, m)] = signal + noise[lag];
+            derivative[(n, m)] = signal * turn;
+        }
+        Ok([covariance, derivative])
     }
 
     /// Bound on the standard deviation of velocity \[m/s\] for `windows` independent windows.

@@ -21,7 +21,7 @@ pub use likelihood::likelihood_tapers;
 pub use model_peak::{ModelPeak, model_lag_weights};
 pub use noise_floor::noise_floor;
 pub use peak::SpectralPeak;
-pub use periodogram::{PeriodogramOptions, PeriodogramPlan};
+pub use periodogram::PeriodogramPlan;
 pub use pulse_pair::PulsePair;
 pub use statistic::{Estimator, Statistic, estimate_window};
 pub use velocity::{GateVelocity, Quality, Refinement};

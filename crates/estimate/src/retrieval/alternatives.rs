@@ -7,10 +7,11 @@
 
 use ndarray::Array2;
 
+use crate::Measured;
 use crate::error::Error;
 use crate::retrieval::hypotheses::{AS_IT_IS, End, Kind, ROUGH, Stage};
 use crate::retrieval::report::{COMPETES, Chosen, Report};
-use crate::retrieval::{Flag, Measured, ScanResult, VortexResult};
+use crate::retrieval::{Flag, ScanResult, VortexResult};
 use crate::vortex_fit::damped_newton::Stop;
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::{Parameter, Vortex, Wake};

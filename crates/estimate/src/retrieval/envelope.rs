@@ -15,9 +15,10 @@
 use ndarray::ArrayView3;
 use std::f64::consts::PI;
 
+use crate::Measured;
 use crate::error::{Error, length, positive};
 use crate::estimators::tails::bisected;
-use crate::retrieval::{Measured, Side};
+use crate::retrieval::Side;
 use crate::vortex_fit::map_fit::data::validate_axes;
 use crate::vortex_fit::{Vortex, Wake, WakeModel};
 use crate::window::SPEED_OF_LIGHT_M_S;

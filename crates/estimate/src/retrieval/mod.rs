@@ -49,7 +49,7 @@ pub use gates::expected_velocities;
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use plausible::without_implausible_vortices;
 pub use radial_velocity::radial_velocity_method;
-pub use result::{Flag, Measured, ScanResult, Side, VortexResult};
+pub use result::{Flag, ScanResult, Side, VortexResult};
 pub use scan_map::ScanMap;
 pub use secondary::with_secondary_vortices;
 pub use track::{Track, TrackPoint, TrackedVortex, track};

@@ -113,7 +113,8 @@ impl Limit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::retrieval::{Measured, Side};
+    use crate::Measured;
+    use crate::retrieval::Side;
     use ndarray::Array2;
 
     fn map(gate_m: f64, line_rad: f64) -> ScanMap {

@@ -8,11 +8,12 @@
 
 use ndarray::Array2;
 
+use crate::Measured;
 use crate::error::{Error, enough_velocities};
 use crate::retrieval::aliases::{CALM, Unfolded};
 use crate::retrieval::hypotheses::{End, Kind, Stage};
 use crate::retrieval::report::{Chosen, Report};
-use crate::retrieval::{Measured, Movement, RetrievalOptions, ScanMap, ScanResult};
+use crate::retrieval::{Movement, RetrievalOptions, ScanMap, ScanResult};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
 use crate::vortex_fit::{FreeParameters, Loss, Sharing, Vortex, Wake};

@@ -4,9 +4,10 @@
 
 use ndarray::{Array1, Array2, Axis};
 
+use crate::Measured;
 use crate::error::Error;
 use crate::retrieval::hypotheses::{End, Kind, Stage, best, least, tops};
-use crate::retrieval::{Covariance, Flag, Measured, ScanResult, Side, VortexResult};
+use crate::retrieval::{Covariance, Flag, ScanResult, Side, VortexResult};
 use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::map_fit::least_squares::{Scores, Uncertainty};
 use crate::vortex_fit::{Parameter, Top, Wake};

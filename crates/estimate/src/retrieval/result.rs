@@ -2,19 +2,10 @@
 
 use ndarray::Array2;
 
+use crate::Measured;
 use crate::retrieval::ScanMap;
 use crate::vortex_fit::wake::motion::Motion;
 use crate::vortex_fit::{PARAMETERS, Parameter, Top, Wake, WakeModel};
-
-/// A number with its standard deviation; NaN where that is not known.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Measured {
-    /// The value.
-    pub value: f64,
-    /// Its standard deviation, in the same unit.
-    pub std: f64,
-}
 
 impl Measured {
     /// A parameter of a wake with that covariance \[10, 10\].

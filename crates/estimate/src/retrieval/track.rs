@@ -8,8 +8,9 @@
 
 use ndarray::{Array1, Array2};
 
+use crate::Measured;
 use crate::error::{Error, finite, increasing, not_empty, positive};
-use crate::retrieval::{Measured, ScanResult, Side, VortexResult};
+use crate::retrieval::{ScanResult, Side, VortexResult};
 use crate::vortex_fit::damped_newton::inverse;
 use crate::vortex_fit::{Vortex, Wake};
 

@@ -20,5 +20,5 @@ mod spikes;
 pub use bank::DetectorOptions;
 pub use detector::{WakeDetector, WakeStatistic};
 pub use law::EmptyScanLaw;
-pub use power::{DetectionTrials, Share};
+pub use power::DetectionTrials;
 pub use spikes::without_spikes;

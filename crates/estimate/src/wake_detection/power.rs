@@ -4,6 +4,7 @@
 //! see the same backgrounds, so the curve is smooth. With places known it would be Phi(Gamma/sigma_Gamma - sqrt(T_c)). Check:
 //! against that form; whole drawn scans.
 
+use crate::Measured;
 use ndarray::{Array1, Array2};
 use rand::{Rng, RngExt};
 
@@ -26,27 +27,6 @@ pub struct DetectionTrials<'a> {
     /// Products of wakes of unit mean circulation.
     wakes: Vec<Array1<f64>>,
     circulation_std_m2_s: Vec<f64>,
-}
-
-/// A share of trials.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Share {
-    /// The share.
-    pub value: f64,
-    /// Its binomial standard error.
-    pub standard_error: f64,
-}
-
-impl Share {
-    /// Of `hits` among `trials`.
-    #[must_use]
-    pub fn of(hits: usize, trials: usize) -> Self {
-        let value = hits as f64 / trials as f64;
-        Self {
-            value,
-            standard_error: (value * (1.0 - value) / trials as f64).sqrt(),
-        }
-    }
 }
 
 impl WakeDetector {
@@ -126,7 +106,7 @@ impl DetectionTrials<'_> {
 
     /// Shares of the wakes of each circulation \[m^2/s\] whose statistic exceeds a threshold, which must not be negative.
     #[must_use]
-    pub fn detection(&self, circulation_m2_s: &[f64], threshold: f64) -> Vec<Share> {
+    pub fn detection(&self, circulation_m2_s: &[f64], threshold: f64) -> Vec<Measured> {
         let missed = self.missed_m2_s(threshold);
         circulation_m2_s
             .iter()
@@ -219,9 +199,9 @@ fn found_nine_times(missed: &[[f64; 2]], about: f64) -> f64 {
 }
 
 /// Share of trials that find a circulation, of those between which each misses it.
-fn share(missed_m2_s: &[[f64; 2]], circulation_m2_s: f64) -> Share {
+fn share(missed_m2_s: &[[f64; 2]], circulation_m2_s: f64) -> Measured {
     let is_missed = |[low, high]: &&[f64; 2]| (*low..=*high).contains(&circulation_m2_s);
-    Share::of(
+    Measured::share(
         missed_m2_s.len() - missed_m2_s.iter().filter(is_missed).count(),
         missed_m2_s.len(),
     )

@@ -27,7 +27,7 @@ fn gates() -> Gates {
 }
 
 fn plan() -> PeriodogramPlan<f64> {
-    PeriodogramPlan::new(&table_2(), 64, &PeriodogramOptions::default()).unwrap()
+    PeriodogramPlan::new(&table_2(), 64).unwrap()
 }
 
 fn scan(records: &Array2<f64>, elevation_rad: &[f64]) -> Scan {
@@ -308,7 +308,7 @@ fn maps<S: Sample>(records: &Array2<S>) -> Vec<MapPoint> {
         SignalKind::Real => table_2(),
         SignalKind::Complex => Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap(),
     };
-    let whole = PeriodogramPlan::<S>::new(&sampling, 64, &PeriodogramOptions::default()).unwrap();
+    let whole = PeriodogramPlan::<S>::new(&sampling, 64).unwrap();
     let short = ShortCorrelogram::<S>::new(64, 17).unwrap();
     let model = ModelPeak::new(&sampling, S::KIND, 17, 16, 512, Refinement::Parabola).unwrap();
     let scans: [(Scan, &dyn Estimator); 2] = [

@@ -51,22 +51,20 @@ fn correlogram_and_periodogram_reproduce_the_stored_window() {
     }
 }
 
+/// The estimator with that weighting, the rest by default.
+fn weighted(weighting: Weighting) -> PeriodogramPlan<f64> {
+    PeriodogramPlan::with(&table_2(), 64, weighting, 1024, Refinement::Parabola).unwrap()
+}
+
 #[test]
 fn peak_velocities_reproduce_the_stored_window() {
     let (x, _, _) = stored_window();
     let mut scratch = Scratch::new();
-    let literal = PeriodogramOptions::literal(Weighting::Rectangular, 64);
-    for (options, velocity_m_s) in [
-        (literal, -4.6015625),
-        (
-            PeriodogramOptions {
-                padded_samples: 4096,
-                ..literal
-            },
-            -4.1758422852,
-        ),
-    ] {
-        let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
+    let sampling = table_2();
+    let rectangular = Weighting::Rectangular;
+    let literal = PeriodogramPlan::<f64>::literal(&sampling, 64, rectangular).unwrap();
+    let padded = PeriodogramPlan::with(&sampling, 64, rectangular, 4096, Refinement::None).unwrap();
+    for (plan, velocity_m_s) in [(literal, -4.6015625), (padded, -4.1758422852)] {
         let found = plan.velocity(&x, &mut scratch).unwrap();
         assert_abs_diff_eq!(found.velocity_m_s, velocity_m_s, epsilon = 1e-9);
         assert_eq!(found.flag, Quality::Good);
@@ -171,12 +169,8 @@ fn white_noise_reads_its_variance_for_every_weighting() {
 #[test]
 fn noise_free_tones_keep_their_velocity_within_the_leakage() {
     let mut scratch = Scratch::new();
-    let rectangular = PeriodogramOptions {
-        weighting: Weighting::Rectangular,
-        ..PeriodogramOptions::default()
-    };
-    for (options, bar_m_s) in [(rectangular, 0.09), (PeriodogramOptions::default(), 0.04)] {
-        let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
+    for (weighting, bar_m_s) in [(Weighting::Rectangular, 0.09), (Weighting::default(), 0.04)] {
+        let plan = weighted(weighting);
         let mut worst_m_s = 0.0_f64;
         for step in 0..60 {
             let velocity_m_s = -18.0 + 0.61 * step as f64;
@@ -185,15 +179,14 @@ fn noise_free_tones_keep_their_velocity_within_the_leakage() {
             assert_eq!(found.flag, Quality::Good);
             worst_m_s = worst_m_s.max((found.velocity_m_s - velocity_m_s).abs());
         }
-        assert!(worst_m_s < bar_m_s, "{options:?}: {worst_m_s}");
+        assert!(worst_m_s < bar_m_s, "{weighting:?}: {worst_m_s}");
     }
 }
 
 #[test]
 fn complex_tones_have_no_image_and_keep_their_velocity() {
     let sampling = Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap();
-    let options = PeriodogramOptions::default();
-    let plan = PeriodogramPlan::<Complex<f64>>::new(&sampling, 64, &options).unwrap();
+    let plan = PeriodogramPlan::<Complex<f64>>::new(&sampling, 64).unwrap();
     for velocity_m_s in [-18.3, -3.7, 0.0, 0.001, 7.77] {
         let turn = std::f64::consts::TAU * sampling.frequency_hz(velocity_m_s) / 250e6;
         let window: Vec<_> = (0..64)
@@ -210,15 +203,14 @@ fn complex_tones_have_no_image_and_keep_their_velocity() {
 
 #[test]
 fn power_in_the_band_of_a_real_tone_is_half_its_amplitude_squared() {
-    let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &PeriodogramOptions::default()).unwrap();
+    let plan = PeriodogramPlan::<f64>::new(&table_2(), 64).unwrap();
     let found = plan.velocity(&tone(1.0, 0.3), &mut Scratch::new()).unwrap();
     assert_relative_eq!(found.power, 0.5, max_relative = 0.01);
 }
 
 #[test]
 fn literal_mode_stays_on_a_grid_of_three_metres_per_second() {
-    let options = PeriodogramOptions::literal(Weighting::Rectangular, 64);
-    let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
+    let plan = PeriodogramPlan::<f64>::literal(&table_2(), 64, Weighting::Rectangular).unwrap();
     let mut scratch = Scratch::new();
     // calm air lies between bins 20 and 21 and reads one of the two
     let read_m_s = plan
@@ -239,7 +231,7 @@ fn literal_mode_stays_on_a_grid_of_three_metres_per_second() {
 
 #[test]
 fn amplitudes_of_1e_minus_200_and_1e200_keep_their_velocity() {
-    let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &PeriodogramOptions::default()).unwrap();
+    let plan = PeriodogramPlan::<f64>::new(&table_2(), 64).unwrap();
     let mut scratch = Scratch::new();
     let window = tone(-3.7, 0.4);
     let reference = plan.velocity(&window, &mut scratch).unwrap();
@@ -259,11 +251,7 @@ fn empty_constant_and_broken_signals_have_no_velocity() {
         Weighting::default(),
         Weighting::Hann,
     ] {
-        let options = PeriodogramOptions {
-            weighting,
-            ..PeriodogramOptions::default()
-        };
-        let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
+        let plan = weighted(weighting);
         let mut scratch = Scratch::new();
         let mut broken = tone(1.0, 0.0);
         broken[10] = f64::NAN;
@@ -284,11 +272,7 @@ fn empty_constant_and_broken_signals_have_no_velocity() {
 fn tones_outside_the_band_are_flagged() {
     let mut scratch = Scratch::new();
     for weighting in [Weighting::Rectangular, Weighting::default()] {
-        let options = PeriodogramOptions {
-            weighting,
-            ..PeriodogramOptions::default()
-        };
-        let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
+        let plan = weighted(weighting);
         for velocity_m_s in [-34.0, -28.0, -24.0, -20.5, 20.5, 24.0, 30.0, 45.0, 100.0] {
             let found = plan
                 .velocity(&tone(velocity_m_s, 0.7), &mut scratch)
@@ -307,7 +291,7 @@ fn tones_outside_the_band_are_flagged() {
 
 #[test]
 fn noise_at_minus_40_db_gives_finite_velocities_spread_over_the_band() {
-    let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &PeriodogramOptions::default()).unwrap();
+    let plan = PeriodogramPlan::<f64>::new(&table_2(), 64).unwrap();
     let mut scratch = Scratch::new();
     let signal = tone(3.0, 0.0);
     let windows = 2000;

@@ -252,7 +252,7 @@ fn a_line_has_no_width_in_any_weighting_and_a_short_window_none_at_all() {
         );
     }
     // 64 ns tell nothing of a spectrum beside noise: its peak fills the band
-    let plan = PeriodogramPlan::<f64>::new(&table_2(), 16, &PeriodogramOptions::default()).unwrap();
+    let plan = PeriodogramPlan::<f64>::new(&table_2(), 16).unwrap();
     let found = plan.velocity(&tone[..16], &mut Scratch::new()).unwrap();
     assert!(
         found.width_m_s().is_nan() && found.resolution_m2_s2.is_nan(),
@@ -270,8 +270,7 @@ fn weighted_windows_measure_width_and_snr_up_to_20_db() {
             4000,
             &mut rng,
         );
-        let plan =
-            PeriodogramPlan::<f64>::new(&table_2(), 64, &PeriodogramOptions::default()).unwrap();
+        let plan = PeriodogramPlan::<f64>::new(&table_2(), 64).unwrap();
         let found = plan.estimator.estimate(&mean, &mut Scratch::new());
         let ratios = (
             found.width_m_s() / pulse_width_m_s(full_width_s),
@@ -307,7 +306,7 @@ fn of_two_targets_the_stronger_is_returned() {
         .map(f64::from)
         .map(|n| (turn(-6.0) * n).cos() + 0.8 * (turn(8.0) * n + 1.0).cos())
         .collect();
-    let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &PeriodogramOptions::default()).unwrap();
+    let plan = PeriodogramPlan::<f64>::new(&table_2(), 64).unwrap();
     let found = plan.velocity(&real, &mut Scratch::new()).unwrap();
     assert!((found.velocity_m_s + 6.0).abs() < 0.3, "{found:?}");
     // the same for the other peaks, from a mean over phases in a little noise; 16 lags resolve 12 m/s

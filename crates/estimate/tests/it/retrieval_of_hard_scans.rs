@@ -5,6 +5,7 @@ use crate::fixtures::normal;
 use ndarray::Array2;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::*;
 use wakescope_estimate::vortex_fit::*;
 

@@ -6,10 +6,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use statrs::distribution::{ContinuousCDF, Normal};
+use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
 use wakescope_estimate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use wakescope_estimate::wake_detection::{
-    DetectorOptions, EmptyScanLaw, Share, WakeDetector, WakeStatistic,
+    DetectorOptions, EmptyScanLaw, WakeDetector, WakeStatistic,
 };
 
 /// A generator for each number; other seeds have others.
@@ -306,7 +307,7 @@ fn false_alarms_keep_their_rate_in_white_noise_of_another_geometry_with_holes_an
 }
 
 /// Rates in 2000 scans of the turbulence, and the share of them in which a threshold for white noise alarms.
-fn alarms_in_turbulence(case: &Case) -> Share {
+fn alarms_in_turbulence(case: &Case) -> Measured {
     let pairs = DetectorOptions {
         spacing_m: (47.0, 47.0),
         single_vortices: false,
@@ -329,7 +330,7 @@ fn alarms_in_turbulence(case: &Case) -> Share {
         .unwrap()
         .threshold(1e-2)
         .unwrap();
-    Share::of(found[1].iter().filter(|t| **t > threshold).count(), 2000)
+    Measured::share(found[1].iter().filter(|t| **t > threshold).count(), 2000)
 }
 
 #[test]
@@ -449,7 +450,7 @@ fn thresholds_are_those_of_an_independent_study_and_wakes_are_found_as_often_as_
             let known = Normal::standard().cdf(bounds - threshold.sqrt());
             println!("{bounds} {found:?}, known place {known:.3}, study {study}");
             // the best of many places is better than one, by what chance adds there
-            let errors = 3.0 * found.standard_error;
+            let errors = 3.0 * found.std;
             assert!(
                 found.value > known - errors && found.value < known + 0.14 + errors,
                 "{bounds}: {found:?} {known}"
@@ -486,7 +487,7 @@ fn shares_from_products_are_those_of_whole_scans_with_wakes() {
             .count();
         assert_eq!(
             trials.detection(&[circulation_m2_s], threshold),
-            [Share::of(counted, 2000)]
+            [Measured::share(counted, 2000)]
         );
     }
     let mut rng = stream(10)(0);
@@ -508,8 +509,8 @@ fn shares_from_products_are_those_of_whole_scans_with_wakes() {
         let velocity = &case.empty + &exact + case.deviation.mapv(|std| std * normal(&mut rng));
         found += usize::from(detector.statistic(velocity.view()).unwrap().value > threshold);
     }
-    let found = Share::of(found, 1000);
-    let error = found.standard_error.hypot(expected.standard_error);
+    let found = Measured::share(found, 1000);
+    let error = found.std.hypot(expected.std);
     assert!(
         (found.value - expected.value).abs() < 3.5 * error,
         "{found:?} {expected:?}"
@@ -629,7 +630,7 @@ fn scans_that_miss_some_velocities_keep_below_the_rate_and_those_that_miss_many_
             holed += of(holes(&exact + &noise));
         }
     }
-    let alarms = Share::of(alarms, 600);
+    let alarms = Measured::share(alarms, 600);
     assert!(
         alarms.value < 0.1 + 3.0 * 0.013 && alarms.value > 0.05,
         "{alarms:?}"

@@ -5,7 +5,7 @@
 //! (Richardson 1911). Where no order is found, the reference is the finest run.
 
 use super::keys::CELLS;
-use super::metrics::{Metric, Shift};
+use super::metrics::Metric;
 use super::{Report, Request, Row, Setting};
 use crate::Error;
 use crate::flow::CaseFile;
@@ -13,6 +13,7 @@ use crate::flow::trial::{History, history_of};
 use crate::io::csv::float_text;
 use crate::setup::progress::{Observer, Stage};
 use std::time::Instant;
+use wakescope_estimate::Measured;
 
 /// Lengths of the cells over those of the case.
 const MESHES: [f64; 3] = [1.0, 1.5, 2.0];
@@ -154,7 +155,7 @@ impl Report {
             orders.push(format!("{} {order}", metric.name()));
             let usable = rows.iter_mut().filter(|row| row.refused.is_none());
             for (row, error) in usable.zip(errors) {
-                row.shifts.push((*metric, Shift::exact(error)));
+                row.shifts.push((*metric, Measured::exact(error)));
             }
         }
         let orders = orders.join(", ");

@@ -9,6 +9,7 @@ use crate::measure::map::VelocityEstimates;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::sweep::Retrieval;
+use wakescope_estimate::Measured;
 
 crate::keys::keys! {
     /// A result of a run whose error is assessed.
@@ -36,41 +37,6 @@ crate::keys::keys! {
         Energy = "energy",
         /// Power that viscosity and the subgrid model dissipate.
         Dissipation = "dissipation",
-    }
-}
-
-/// A relative shift and its standard error.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Shift {
-    /// Value over that of the reference, less one.
-    pub shift: f64,
-    /// Standard error of the shift; 0 where the shift is exact.
-    pub standard_error: f64,
-}
-
-impl Shift {
-    /// A shift without uncertainty.
-    pub(super) fn exact(shift: f64) -> Self {
-        Self {
-            shift,
-            standard_error: 0.0,
-        }
-    }
-
-    /// Size of the shift plus two standard errors.
-    #[must_use]
-    pub fn bound(self) -> f64 {
-        self.shift.abs() + 2.0 * self.standard_error
-    }
-
-    /// The shift of a metric that changes in proportion, with a known uncertain ratio.
-    pub(super) fn times(self, ratio: Self) -> Self {
-        let of_shift = ratio.shift * self.standard_error;
-        let of_ratio = ratio.standard_error * self.shift;
-        Self {
-            shift: ratio.shift * self.shift,
-            standard_error: of_shift.hypot(of_ratio),
-        }
     }
 }
 
@@ -110,12 +76,12 @@ impl Jackknife {
     }
 
     /// Distance from `reference`, over a scale.
-    fn shift(&self, reference: &Self, scale: &Self) -> Shift {
+    fn shift(&self, reference: &Self, scale: &Self) -> Measured {
         let difference = self.combined(reference, |a, b| a - b);
         let relative = difference.combined(scale, |difference, scale| difference / scale);
-        Shift {
-            shift: relative.all,
-            standard_error: relative.standard_error(),
+        Measured {
+            value: relative.all,
+            std: relative.standard_error(),
         }
     }
 }
@@ -188,7 +154,7 @@ impl Sample {
     }
 
     /// Shift of a metric from a reference, over cells known to both, of circulations over the maps fitted in both.
-    pub(super) fn shift(&self, reference: &Self, metric: Metric) -> Shift {
+    pub(super) fn shift(&self, reference: &Self, metric: Metric) -> Measured {
         if metric == Metric::Circulation {
             let pairs = self
                 .circulation_m2_s
@@ -343,10 +309,10 @@ mod tests {
     #[test]
     fn shifts_paired_by_seed_have_no_noise_where_errors_are_proportional() {
         let (fine, coarse) = (sample(8, 500, |e| e), sample(8, 500, |e| 1.02 * e));
-        assert_eq!(fine.shift(&fine, Metric::Std), Shift::default());
+        assert_eq!(fine.shift(&fine, Metric::Std), Measured::default());
         let found = coarse.shift(&fine, Metric::Std);
         assert!(
-            (found.shift - 0.02).abs() < 1e-12 && found.standard_error < 1e-12,
+            (found.value - 0.02).abs() < 1e-12 && found.std < 1e-12,
             "{found:?}"
         );
         assert!(fine.noise(Metric::Std) > 1e-3);
@@ -366,10 +332,10 @@ mod tests {
                 ..Sample::default()
             });
             let found = coarse.shift(&fine, Metric::Efficiency);
-            scatter += (found.shift - 0.02).powi(2);
-            predicted += found.standard_error.powi(2);
+            scatter += (found.value - 0.02).powi(2);
+            predicted += found.std.powi(2);
             // Unpaired, the scatter of 30 % alone would leave 10 %.
-            assert!(found.standard_error < 0.04, "{found:?}");
+            assert!(found.std < 0.04, "{found:?}");
         }
         let ratio = (predicted / scatter).sqrt();
         assert!((ratio - 1.0).abs() < 0.08, "{ratio}");
@@ -397,7 +363,7 @@ mod tests {
             offset_m_s: vec![0.0; 50],
             ..still.clone()
         });
-        assert_eq!(coarse.shift(&fine, Metric::Bias), Shift::default());
+        assert_eq!(coarse.shift(&fine, Metric::Bias), Measured::default());
     }
 
     #[test]
@@ -414,7 +380,7 @@ mod tests {
         coarse.circulation_m2_s[1] = f64::NAN;
         let found = coarse.shift(&fine, Metric::Circulation);
         assert!(
-            (found.shift - 0.02).abs() < 1e-12 && found.standard_error < 1e-12,
+            (found.value - 0.02).abs() < 1e-12 && found.std < 1e-12,
             "{found:?}"
         );
     }
@@ -425,6 +391,6 @@ mod tests {
         let mut holes = fine.clone();
         (0..13).for_each(|cell| holes.error_m_s[2][cell] = f64::NAN);
         assert_eq!((holes.lost(&fine), fine.lost(&fine)), (0.13, 0.0));
-        assert_eq!(holes.shift(&fine, Metric::Std), Shift::default());
+        assert_eq!(holes.shift(&fine, Metric::Std), Measured::default());
     }
 }

@@ -22,7 +22,8 @@ mod text;
 use crate::Error;
 use crate::io::Provenance;
 use crate::sweep::front::front;
-use metrics::{Metric, Shift};
+use metrics::Metric;
+use wakescope_estimate::Measured;
 
 /// What is requested of a report.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,7 +117,7 @@ pub struct Row {
     /// The value as it is printed.
     pub label: String,
     /// Relative shift of each metric that the setting acts on.
-    pub shifts: Vec<(Metric, Shift)>,
+    pub shifts: Vec<(Metric, Measured)>,
     /// Fraction of the gates that have no estimate with this value and have one with the finest.
     pub lost: f64,
     /// Why the program refuses the value.
@@ -170,7 +171,7 @@ impl Row {
 
     /// Shift of a metric, where the setting acts on it and the value was run.
     #[must_use]
-    pub fn shift(&self, metric: Metric) -> Option<Shift> {
+    pub fn shift(&self, metric: Metric) -> Option<Measured> {
         self.shifts
             .iter()
             .find(|(own, _)| *own == metric)
@@ -224,7 +225,7 @@ impl Report {
         for (_, row) in self.rows() {
             let shift = row.shift(metric).filter(|_| row.is_usable());
             run_s.push(row.run_s);
-            errors.push(shift.map_or(f64::NAN, Shift::bound));
+            errors.push(shift.map_or(f64::NAN, Measured::bound));
         }
         front(&[run_s, errors])
     }
@@ -235,9 +236,9 @@ mod tests {
     use super::*;
 
     fn row(value: f64, run_s: f64, shift: f64, standard_error: f64) -> Row {
-        let shift = Shift {
-            shift,
-            standard_error,
+        let shift = Measured {
+            value: shift,
+            std: standard_error,
         };
         Row {
             shifts: vec![(Metric::Rms, shift)],

@@ -1,14 +1,15 @@
 //! The picture of a report: for each metric error against run time, with the front.
 
 use super::Report;
-use super::metrics::{Metric, Shift};
+use super::metrics::Metric;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_estimate::Measured;
 
 /// Smallest error that is drawn, %: a logarithmic axis has no zero.
 const SMALLEST: f64 = 1e-3;
 
 /// Error in percent as it is drawn.
-fn drawn(shift: Shift) -> f64 {
+fn drawn(shift: Measured) -> f64 {
     (100.0 * shift.bound()).max(SMALLEST)
 }
 

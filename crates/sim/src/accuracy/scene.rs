@@ -7,7 +7,7 @@
 use super::keys::{
     GRID_POINTS, GRID_SPACING, LAYERS, PADDED, PATHS, REALISATIONS, WINDOW_STEP, value, with,
 };
-use super::metrics::{Metric, Sample, Shift};
+use super::metrics::{Metric, Sample};
 use super::{Report, Request, Row, Setting};
 use crate::Error;
 use crate::io::csv::float_text;
@@ -23,6 +23,7 @@ use crate::setup::progress::{Observer, Stage};
 use crate::setup::table::of_table;
 use crate::sweep::Common;
 use std::time::Instant;
+use wakescope_estimate::Measured;
 use wakescope_optics::plan::{LayerGap, Model};
 
 /// Fewest realisations of the scan for a standard error by the jackknife.
@@ -149,7 +150,7 @@ struct Study<'a> {
     /// The run with the given values.
     given: Trial,
     /// Shift of metrics of the map for a relative shift of the efficiency of their signals.
-    response: Vec<(Metric, Shift)>,
+    response: Vec<(Metric, Measured)>,
 }
 
 impl<'a> Study<'a> {
@@ -216,13 +217,13 @@ impl<'a> Study<'a> {
     }
 
     /// What a change of the efficiency does to the metrics of the map.
-    fn measured_response(&self) -> Result<Vec<(Metric, Shift)>, Error> {
+    fn measured_response(&self) -> Result<Vec<(Metric, Measured)>, Error> {
         let mut scene = self.base.content.clone();
         scene.pulse.energy_j *= 1.0 + RAISED;
         let raised = self.run(&self.base.with(scene)?)?.sample;
         let response = |metric| {
             let shift = raised.shift(&self.given.sample, metric);
-            (metric, shift.times(Shift::exact(1.0 / RAISED)))
+            (metric, shift.times(Measured::exact(1.0 / RAISED)))
         };
         Ok(self.of_map().map(response).collect())
     }
@@ -300,14 +301,20 @@ impl<'a> Study<'a> {
     }
 
     /// Shifts of all metrics by a setting; `ratio` is the value of the base over that of the run.
-    fn shifts(&self, key: &str, ratio: f64, trial: &Trial, finest: &Trial) -> Vec<(Metric, Shift)> {
-        let noise = |metric| Shift {
-            shift: 0.0,
-            standard_error: self.given.sample.noise(metric) * ratio.sqrt(),
+    fn shifts(
+        &self,
+        key: &str,
+        ratio: f64,
+        trial: &Trial,
+        finest: &Trial,
+    ) -> Vec<(Metric, Measured)> {
+        let noise = |metric| Measured {
+            value: 0.0,
+            std: self.given.sample.noise(metric) * ratio.sqrt(),
         };
         match key {
             LAYERS => {
-                let [middle, largest] = trial.layer_shift.map(Shift::exact);
+                let [middle, largest] = trial.layer_shift.map(Measured::exact);
                 self.by_efficiency(middle, largest)
             }
             GRID_POINTS | GRID_SPACING => {
@@ -330,7 +337,7 @@ impl<'a> Study<'a> {
     }
 
     /// What a shift of the efficiency in the middle of the scan, and one anywhere in it, do to all metrics.
-    fn by_efficiency(&self, middle: Shift, anywhere: Shift) -> Vec<(Metric, Shift)> {
+    fn by_efficiency(&self, middle: Measured, anywhere: Measured) -> Vec<(Metric, Measured)> {
         let mut shifts = Vec::new();
         if self.metrics.contains(&Metric::Efficiency) {
             shifts.push((Metric::Efficiency, middle));

@@ -2,7 +2,6 @@
 //!
 //! Run times differ from run to run: they, and what follows from them, are the last columns of the table.
 
-use super::metrics::Shift;
 use super::{Report, Row, Setting};
 #[cfg(feature = "cli")]
 use crate::Error;
@@ -10,6 +9,7 @@ use crate::io::Table;
 #[cfg(feature = "cli")]
 use crate::outputs::Outputs;
 use crate::plan::units::seconds;
+use wakescope_estimate::Measured;
 
 /// A fraction in percent.
 fn percent(fraction: f64) -> String {
@@ -23,10 +23,10 @@ fn percent(fraction: f64) -> String {
 }
 
 /// A shift in percent, with two standard errors where it is uncertain.
-fn shift_text(shift: Shift) -> String {
-    match shift.standard_error {
-        0.0 => percent(shift.shift),
-        error => format!("{} ({})", percent(shift.shift), percent(2.0 * error)),
+fn shift_text(shift: Measured) -> String {
+    match shift.std {
+        0.0 => percent(shift.value),
+        error => format!("{} ({})", percent(shift.value), percent(2.0 * error)),
     }
 }
 
@@ -63,9 +63,9 @@ impl Report {
             for ((setting, row), on_front) in self.rows().zip(self.front(*metric)) {
                 let shift = row.shift(*metric);
                 if shift.is_some() || row.refused.is_some() {
-                    let unknown = Shift {
-                        shift: f64::NAN,
-                        standard_error: f64::NAN,
+                    let unknown = Measured {
+                        value: f64::NAN,
+                        std: f64::NAN,
                     };
                     cells.push((setting, row, metric, shift.unwrap_or(unknown), on_front));
                 }
@@ -76,11 +76,8 @@ impl Report {
             .text("setting", cells.iter().map(|cell| cell.0.key))
             .float("value", cells.iter().map(|cell| cell.1.value))
             .text("metric", cells.iter().map(|cell| cell.2.name()))
-            .float("shift", cells.iter().map(|cell| cell.3.shift))
-            .float(
-                "standard_error",
-                cells.iter().map(|cell| cell.3.standard_error),
-            )
+            .float("shift", cells.iter().map(|cell| cell.3.value))
+            .float("standard_error", cells.iter().map(|cell| cell.3.std))
             .text("status", cells.iter().map(|cell| self.status(cell.1)))
             .float("run_s", cells.iter().map(|cell| cell.1.run_s))
             .int("front", cells.iter().map(|cell| i64::from(cell.4)))

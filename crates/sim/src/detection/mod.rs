@@ -21,10 +21,11 @@ use crate::Error;
 use crate::setup::progress::{Observer, Stage};
 use crate::setup::streams::stream;
 use ndarray::s;
+use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
 use wakescope_estimate::vortex_fit::WakeModel;
 use wakescope_estimate::wake_detection::{
-    DetectorOptions, EmptyScanLaw, Share, WakeDetector, WakeStatistic, without_spikes,
+    DetectorOptions, EmptyScanLaw, WakeDetector, WakeStatistic, without_spikes,
 };
 
 /// Backgrounds with wakes that are drawn for the shares of wakes that are found.
@@ -109,7 +110,7 @@ impl ScanDetection {
 }
 
 /// Circulation, m^2/s, rate of false alarms, threshold and share of wakes that are found.
-pub type FoundShare = (f64, f64, f64, Share);
+pub type FoundShare = (f64, f64, f64, Measured);
 
 /// How often wakes are found in one geometry and background.
 #[derive(Debug, Clone, PartialEq)]
@@ -282,7 +283,12 @@ impl Calibration {
                     .iter()
                     .filter(|value| **value > threshold)
                     .count();
-                roc.push((circulation_m2_s, rate, threshold, Share::of(hits, TRIALS)));
+                roc.push((
+                    circulation_m2_s,
+                    rate,
+                    threshold,
+                    Measured::share(hits, TRIALS),
+                ));
             }
         }
         let [measured, smallest_error_m2_s, foretold] =

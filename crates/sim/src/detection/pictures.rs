@@ -21,13 +21,13 @@ pub fn picture(power: &Power) -> Figure {
         let circulation_m2_s = curve.first().map_or(f64::NAN, |row| row.0);
         let bounds = circulation_m2_s / power.circulation_std_m2_s;
         let label = format!("{circulation_m2_s:.0} m²/s ({bounds:.0} σ)");
-        let errors: Vec<f64> = curve.iter().map(|row| row.3.standard_error).collect();
+        let errors: Vec<f64> = curve.iter().map(|row| row.3.std).collect();
         roc = roc.with(
             Series::new(&label, style, curve.iter().map(|row| (row.1, row.3.value)))
                 .with_band(&errors),
         );
     }
-    let errors: Vec<f64> = power.found.iter().map(|row| row.3.standard_error).collect();
+    let errors: Vec<f64> = power.found.iter().map(|row| row.3.std).collect();
     let found = Series::new(
         "",
         Style::Line,

@@ -96,8 +96,5 @@ pub fn share_table(power: &Power, shares: &[FoundShare], is_one_rate: bool) -> T
     }
     table
         .float("detection", shares.iter().map(|row| row.3.value))
-        .float(
-            "standard_error",
-            shares.iter().map(|row| row.3.standard_error),
-        )
+        .float("standard_error", shares.iter().map(|row| row.3.std))
 }

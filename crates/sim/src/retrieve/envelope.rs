@@ -10,10 +10,11 @@ use crate::plan::Plan;
 use crate::setup::estimators;
 use ndarray::Array3;
 use std::ops::Range;
+use wakescope_estimate::Measured;
 use wakescope_estimate::Weighting;
 use wakescope_estimate::estimators::cell_threshold;
 use wakescope_estimate::retrieval::{
-    EnvelopeResult, Measured, ScanSpectra, SpectralShape, velocity_envelopes,
+    EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelopes,
 };
 
 /// Rate at which the highest cell of noise is above the threshold of an envelope.

@@ -13,8 +13,9 @@ use crate::scene::DetectorSignal;
 use crate::setup::progress::Observer;
 use ndarray::{Array2, ArrayView2, Axis};
 use num_complex::Complex;
+use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{
-    Flag, Measured, Movement, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult,
+    Flag, Movement, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult,
 };
 use wakescope_estimate::vortex_fit::{
     EstimatorResponse, MapFit, MapFitOptions, Parameter, SignalFit, SignalFitOptions, VelocityMap,

@@ -7,9 +7,8 @@ use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 use ndarray::Array2;
-use wakescope_estimate::retrieval::{
-    Flag, Measured, ScanResult, Side, TrackPoint, expected_velocities,
-};
+use wakescope_estimate::Measured;
+use wakescope_estimate::retrieval::{Flag, ScanResult, Side, TrackPoint, expected_velocities};
 
 /// Velocities, the fitted wake and the residual of a scan side by side; velocities alone where no wake was found.
 ///

@@ -7,7 +7,8 @@ use super::table::{UNKNOWN, VORTEX, measured, name as word, with};
 use super::truth::is_there;
 use crate::io::Table;
 use crate::scene::RetrievalMethod as Method;
-use wakescope_estimate::retrieval::{Measured, Side};
+use wakescope_estimate::Measured;
+use wakescope_estimate::retrieval::Side;
 
 /// Errors of one quantity of one vortex by one method: realisations, each as often as it has sweeps, and those without a value; the truth
 /// of the first one, mean error and its standard error, standard deviation, root mean square error, and root mean square of the

@@ -7,8 +7,9 @@ use crate::io::Table;
 use crate::io::scans::{ReadScan, plane_numbers};
 use serde::Serialize;
 use serde_json::{Value, json};
+use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{
-    Measured, RetrievalOptions, ScanResult, Track, TrackedVortex, VortexResult, track,
+    RetrievalOptions, ScanResult, Track, TrackedVortex, VortexResult, track,
 };
 
 /// One scan with what was found in it.

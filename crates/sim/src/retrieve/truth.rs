@@ -8,7 +8,8 @@ use crate::Error;
 use crate::plan::Plan;
 use crate::scene::Flow;
 use crate::setup::wind::vortex_pair;
-use wakescope_estimate::retrieval::{Measured, Side, VortexResult};
+use wakescope_estimate::Measured;
+use wakescope_estimate::retrieval::{Side, VortexResult};
 use wakescope_estimate::vortex_fit::{Vortex, Wake};
 use wakescope_les::analysis::mean_circulation_5_15_m2_s;
 

@@ -50,7 +50,7 @@ fn values_that_lose_gates_are_never_recommended() {
     let noise = &found.settings[2].rows;
     let errors: Vec<f64> = noise
         .iter()
-        .map(|row| row.shift(Metric::Rms).unwrap().standard_error)
+        .map(|row| row.shift(Metric::Rms).unwrap().std)
         .collect();
     let values: Vec<f64> = noise.iter().map(|row| row.value).collect();
     assert_eq!(values, [16.0, 8.0, 4.0, 2.0]);
@@ -70,7 +70,7 @@ fn phase_screens_are_assessed_by_theory_and_by_their_realisations() {
     for row in &setting(LAYERS).rows {
         let efficiency = row.shift(Metric::Efficiency).unwrap();
         assert!(
-            efficiency.standard_error == 0.0 && efficiency.bound() <= 2e-3,
+            efficiency.std == 0.0 && efficiency.bound() <= 2e-3,
             "{row:?}"
         );
         // The signal-to-noise ratio acts on the errors of the map less than in proportion.
@@ -87,10 +87,10 @@ fn phase_screens_are_assessed_by_theory_and_by_their_realisations() {
         .find_map(|row| row.refused.as_ref());
     assert!(refused.is_some_and(|reason| !reason.is_empty()));
     let noise = setting(PATHS).given_row().unwrap();
-    let noise = noise.shift(Metric::Efficiency).unwrap().standard_error;
+    let noise = noise.shift(Metric::Efficiency).unwrap().std;
     let grids = &setting(GRID_POINTS).rows;
     let of_given = grids.iter().find(|row| row.value == 64.0).unwrap();
-    assert!(of_given.shift(Metric::Efficiency).unwrap().standard_error < 3.0 * noise);
+    assert!(of_given.shift(Metric::Efficiency).unwrap().std < 3.0 * noise);
     assert!(noise > 1e-4 && noise < 0.05, "{noise}");
 }
 
