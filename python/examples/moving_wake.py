@@ -8,6 +8,7 @@ The first argument is a folder of `wakescope wake` with a cross-plane every quar
 """
 
 import sys
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -17,7 +18,7 @@ from matplotlib.collections import QuadMesh
 import wakescope
 
 folder, picture = sys.argv[1:]
-keys = {
+keys: dict[str, Any] = {
     "scan.elevation_min_rad": 0.0,
     "scan.elevation_max_rad": 0.2,
     "scan.range_min_m": 285.0,
