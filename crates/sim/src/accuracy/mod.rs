@@ -29,7 +29,7 @@ use wakescope_estimate::Measured;
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct Request {
-    /// Largest relative error of each metric, such as 3%.
+    /// Largest relative error of each metric, e.g. 3%.
     #[cfg_attr(feature = "cli", arg(long, value_name = "ERROR", value_parser = relative_error))]
     pub within: f64,
     /// Metrics to assess; by default all that the scene has.

@@ -1,8 +1,8 @@
 //! `wakescope accuracy`: numerical error and run time of a scene or flow, setting by setting.
 
 use super::Cli;
+use super::args::FolderArgs;
 use super::flow::{case_file, seeded};
-use super::words::FolderWords;
 use crate::Error;
 use crate::accuracy::{Report, Request};
 use crate::flow::WakePreset;
@@ -15,7 +15,7 @@ pub(super) fn accuracy(
     path: Option<&Path>,
     preset: Option<WakePreset>,
     request: &Request,
-    folder: &FolderWords,
+    folder: &FolderArgs,
     cli: &Cli,
 ) -> Result<u8, Error> {
     let prepare = || folder.prepare(cli, |files| Report::list(None, files));

@@ -1,9 +1,9 @@
 //! `wakescope detect`: whether scans hold a wake, and how small a wake is found in scans like them.
 
 use super::Cli;
+use super::args::{AirArgs, FolderArgs, ScanArgs, finite, rate, refuse_idle, spacing, stride};
 use super::data_files::each_usable;
 use super::options::WITHOUT_SCANS;
-use super::words::{AirWords, FolderWords, ScanWords, finite, rate, refuse_idle, spacing, stride};
 use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test,
@@ -23,54 +23,54 @@ use wakescope_estimate::retrieval::{Gate, ScanMap};
 use wakescope_estimate::vortex_fit::WakeModel;
 use wakescope_estimate::wake_detection::DetectorOptions;
 
-/// Words of `wakescope detect`.
+/// Arguments of `wakescope detect`.
 #[derive(Debug, Args)]
-pub(super) struct DetectWords {
-    /// Scans: CfRadial, HALO .hpl or tables; or raw signals, with --scene; without any the scene says what would be found.
+pub(super) struct DetectArgs {
+    /// Scans (CfRadial, HALO, CSV) or raw signals; none: detectability of the scene.
     data: Vec<PathBuf>,
-    /// The scene whose instrument measured them: gates, place of the lidar, noise and how far apart velocities are independent.
+    /// Scene of the instrument: gates, position, noise, correlation of velocities.
     #[arg(long, value_name = "SCENE.toml", required_unless_present = "data")]
     scene: Option<PathBuf>,
-    /// Rate of false alarms of a scan.
+    /// False-alarm rate per scan.
     #[arg(long, value_name = "RATE", default_value_t = 1e-2, value_parser = rate)]
     false_alarm: f64,
     #[command(flatten)]
-    air: AirWords,
-    /// Least and largest distance of the vortices of a pair, m.
+    air: AirArgs,
+    /// Smallest and largest vortex spacing in m.
     #[arg(long, value_name = "MIN,MAX", default_value = "16,63", value_parser = spacing)]
     spacing: (f64, f64),
-    /// Look for pairs only, not for single vortices.
+    /// Search for pairs only, not for single vortices.
     #[arg(long)]
     pairs_only: bool,
-    /// Height of the lidar above the ground, m; that of the scene, or 0.
+    /// Lidar height above ground in m; by default the scene's, or 0.
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = finite)]
     lidar_height: Option<f64>,
-    /// Use every so many lines and gates: of neighbours that share pulses or windows; as the scene's noise asks, or 1,1.
+    /// Stride in lines and gates; by default the scene's correlation, or 1,1.
     #[arg(long, value_name = "LINES,GATES", value_parser = stride)]
     stride: Option<(usize, usize)>,
-    /// Empty scans that are drawn for the threshold.
+    /// Number of empty scans simulated for the threshold.
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(2000..=1_000_000))]
     empty_scans: u32,
     #[command(flatten)]
-    scans: ScanWords,
+    scans: ScanArgs,
     #[command(flatten)]
-    folder: FolderWords,
+    folder: FolderArgs,
 }
 
-pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
-    refuse_idle(&words.data, cli)?;
-    if words.data.is_empty() {
+pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
+    refuse_idle(&args.data, cli)?;
+    if args.data.is_empty() {
         cli.refuse_idle("detect", WITHOUT_SCANS)?;
     }
     let observer = cli.observer();
-    let stated = words
+    let stated = args
         .scene
         .as_deref()
         .map(|path| cli.scene(path))
         .transpose()?;
     let (mut scans, mut notes) = (Vec::new(), Vec::new());
-    let inputs = each_usable(&words.data, &*observer, |path| {
-        words.scans.read(path, stated.as_ref(), false, &*observer)
+    let inputs = each_usable(&args.data, &*observer, |path| {
+        args.scans.read(path, stated.as_ref(), false, &*observer)
     })?;
     for read in inputs {
         scans.extend(read.maps);
@@ -84,18 +84,16 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     let plan = still
         .map(|scene| Plan::new(scene, Target::Map))
         .transpose()?;
-    words
-        .folder
-        .prepare(cli, |files| list(words, None, files))?;
+    args.folder.prepare(cli, |files| list(args, None, files))?;
     let of_plan = plan.as_ref().map(|plan| &plan.scene.content);
-    let (gate, note) = gate_of(scans.first(), words.air.gate_std, of_plan)?;
+    let (gate, note) = gate_of(scans.first(), args.air.gate_std, of_plan)?;
     notes.extend(note.map(str::to_owned));
-    let mut settings = words.settings(cli, of_plan, gate);
+    let mut settings = args.settings(cli, of_plan, gate);
     // The grid of the scene, if there are no scans.
     let mut empty = None;
     if let Some(plan) = &plan {
         let noise = SceneNoise::new(plan, &*observer)?;
-        settings.stride = words.stride.unwrap_or(noise.stride);
+        settings.stride = args.stride.unwrap_or(noise.stride);
         scans
             .iter_mut()
             .for_each(|scan| noise.give(&mut scan.map, scan.scans));
@@ -130,7 +128,7 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     told(&scans, &found, power.as_ref(), &mut text);
     text.push(format!("the rate of false alarms holds for {holds}\n"));
     let object = json!({
-        "false_alarm": words.false_alarm, "background": holds,
+        "false_alarm": args.false_alarm, "background": holds,
         "scans": scans.iter().zip(&found).map(as_json).collect::<Vec<_>>(),
         "smallest_detectable_m2_s": power.as_ref().map(|power| power.smallest_m2_s.0),
         "smallest_detectable_error_m2_s": power.as_ref().map(|power| power.smallest_error_m2_s),
@@ -141,8 +139,8 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
         "notes": notes,
     });
     let tested = Some((&scans[..], &found[..], power.as_ref()));
-    let list = |files: &mut Outputs| list(words, tested, files);
-    words.folder.finish(
+    let list = |files: &mut Outputs| list(args, tested, files);
+    args.folder.finish(
         cli,
         (Default::default(), origin),
         list,
@@ -150,7 +148,7 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     )
 }
 
-impl DetectWords {
+impl DetectArgs {
     /// How wakes are looked for, but for the strides that the noise of a scene asks for.
     fn settings(&self, cli: &Cli, scene: Option<&Scene>, gate: Gate) -> DetectionSettings {
         let height_m = scene.map_or(0.0, |scene| scene.scan.lidar_height_m);
@@ -238,8 +236,8 @@ fn told(
 type Tested<'t> = (&'t [ReadScan], &'t [ScanDetection], Option<&'t Power>);
 
 /// The files, whose content is not there before the tests.
-fn list(words: &DetectWords, of: Option<Tested<'_>>, files: &mut Outputs) -> Result<(), Error> {
-    if !words.data.is_empty() {
+fn list(args: &DetectArgs, of: Option<Tested<'_>>, files: &mut Outputs) -> Result<(), Error> {
+    if !args.data.is_empty() {
         files.table("detection", of.as_ref(), |(scans, found, _)| {
             Ok(scan_table(scans, found))
         })?;

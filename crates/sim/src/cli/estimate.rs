@@ -1,8 +1,8 @@
 //! `wakescope estimate`: velocities from raw signals, simulated or measured.
 
 use super::Cli;
+use super::args::{FolderArgs, noise, positive};
 use super::options::IN_MEMORY;
-use super::words::{FolderWords, noise, positive};
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::measure::recorded::{
@@ -14,63 +14,62 @@ use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Words of `wakescope estimate`.
+/// Arguments of `wakescope estimate`.
 #[derive(Debug, Args)]
-pub(super) struct EstimateWords {
-    /// The signals: signals.nc or another NetCDF file, NPY, NPZ, or a binary file with --format.
+pub(super) struct EstimateArgs {
+    /// Raw signals: NetCDF, NPY, NPZ, or a binary file with --format.
     data: PathBuf,
-    /// The scene whose instrument recorded them and whose estimator they go through.
+    /// Scene of the instrument and the estimator.
     #[arg(long, value_name = "SCENE.toml")]
     scene: PathBuf,
     #[command(flatten)]
-    folder: FolderWords,
+    folder: FolderArgs,
     #[command(flatten)]
     format: RawFormat,
-    /// What the numbers are multiplied with, such as ampere per count.
+    /// Scale factor of raw samples, e.g. A per count.
     #[arg(long, value_name = "A", default_value_t = 1.0, value_parser = positive)]
     scale: f64,
-    /// Frequencies rise with velocities towards the lidar: a receiver that mixes the other way, or the second Nyquist zone.
+    /// Frequencies rise with velocities towards the lidar.
     #[arg(long)]
     towards: bool,
-    /// Table of elevation_rad or elevation_deg, and time_s, of each record or line.
+    /// CSV table of elevation_rad or elevation_deg, and time_s, per record or line.
     #[arg(long, value_name = "FILE.csv")]
     rays: Option<PathBuf>,
-    /// Power of the noise in the band: that of the scene, of the quietest gates, or a number in the square of the samples' unit.
+    /// In-band noise power: scene, quietest gates, or a number (sample unit squared).
     #[arg(long, value_name = "scene|quietest|POWER", value_parser = noise)]
     noise: Option<NoiseLevel>,
-    /// Write the spectrum of each gate, spectra.nc.
+    /// Write the spectrum of each gate to spectra.nc.
     #[arg(long)]
     spectra: bool,
 }
 
-pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
-    let scene = cli.scene(&words.scene)?;
-    let mut records = match cli.signals(&words.data) {
+pub(super) fn estimate(args: &EstimateArgs, cli: &Cli) -> Result<(), Error> {
+    let scene = cli.scene(&args.scene)?;
+    let mut records = match cli.signals(&args.data) {
         Some(records) => {
-            cli.refuse_idle(&words.data, IN_MEMORY)?;
+            cli.refuse_idle(&args.data, IN_MEMORY)?;
             records.not_empty()?
         }
-        None => RawRecords::open(&words.data, &words.format, record_shape(&scene.content))?,
+        None => RawRecords::open(&args.data, &args.format, record_shape(&scene.content))?,
     };
-    records.scale = words.scale;
-    records.is_reversed = words.towards;
-    let rays = words.rays.as_deref().map(RayTable::read).transpose()?;
+    records.scale = args.scale;
+    records.is_reversed = args.towards;
+    let rays = args.rays.as_deref().map(RayTable::read).transpose()?;
     let observer = cli.observer();
     let (plan, is_own) = recorded::plan(scene, &records, &*observer)?;
-    words
-        .folder
+    args.folder
         .prepare_names(cli, &write::recorded_names(&plan)?)?;
     let options = RecordedOptions {
         rays,
-        noise: words.noise,
-        spectra: words.spectra,
+        noise: args.noise,
+        spectra: args.spectra,
         block_bytes: None,
     };
     let found = recorded::estimate((&plan, is_own), &mut records, &options, &*observer)?;
     let (text, results) = told(&plan, &found, records.records);
     let of = (plan.scene.content.outputs, plan.scene.provenance());
-    let object = json!({ "scene_hash": plan.scene.hash, "data": words.data.to_string_lossy(), "results": results });
-    words.folder.finish(
+    let object = json!({ "scene_hash": plan.scene.hash, "data": args.data.to_string_lossy(), "results": results });
+    args.folder.finish(
         cli,
         of,
         |files| write::list_recorded(&plan, found, files),

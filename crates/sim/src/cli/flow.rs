@@ -19,22 +19,22 @@ use wakescope_les::ranks::{Ranks, Single};
 /// Where a simulation writes and how it begins.
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
-    /// Folder to write to; made if it does not exist.
+    /// Output folder; created if missing.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Continue from the checkpoint in the folder.
+    /// Continue from the checkpoint in the output folder.
     #[arg(long, conflicts_with = "overwrite")]
     restart: bool,
-    /// Begin anew and replace existing files, the checkpoint included.
+    /// Start again and replace existing files, checkpoint included.
     #[arg(long)]
     overwrite: bool,
-    /// Print what the run would take and check it; nothing is computed or written.
+    /// Check the case and print the forecast; write nothing.
     #[arg(long)]
     check: bool,
-    /// End of the run in place of the case's: the age tau of a wake, of other flows a time in seconds.
+    /// End of the run: tau of a wake, else time in s.
     #[arg(long, value_name = "END")]
     pub(super) end: Option<f64>,
-    /// Run even if the forecast of the memory is more than the machine has.
+    /// Run even if the memory forecast exceeds the machine's.
     #[arg(long)]
     allow_large: bool,
 }

@@ -1,4 +1,4 @@
-//! Another program that runs commands in its own process, with their words: it is told what a terminal would show, may keep the files
+//! Another program that runs commands in its own process, with their arguments: it receives what a terminal would show, may keep the files
 //! in memory, and gives scenes as texts and signals as arrays.
 //!
 //! Check: the files that are kept are those that the command writes, byte for byte.
@@ -84,15 +84,15 @@ pub(super) struct Call {
     answer: Mutex<Answer>,
 }
 
-/// Runs a command in this process, with its words as after `wakescope`.
+/// Runs a command in this process, with its arguments as after `wakescope`.
 ///
 /// # Errors
 /// Words that the command line does not know, and whatever the command refuses; [`Error::Stopped`] where the observer stopped it.
-pub fn call(words: &[OsString], host: Host) -> Result<Answer, Refusal> {
-    let words = [OsString::from("wakescope")]
+pub fn call(args: &[OsString], host: Host) -> Result<Answer, Refusal> {
+    let args = [OsString::from("wakescope")]
         .into_iter()
-        .chain(words.iter().cloned());
-    let mut cli = Cli::read(words).map_err(|error| Refusal(explained(&error)))?;
+        .chain(args.iter().cloned());
+    let mut cli = Cli::read(args).map_err(|error| Refusal(explained(&error)))?;
     let call = Arc::new(Call {
         host,
         answer: Mutex::default(),

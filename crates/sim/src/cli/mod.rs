@@ -1,21 +1,22 @@
-//! The command line program `wakescope`: words in, files and exit codes out.
+//! The command line program `wakescope`: arguments in, files and exit codes out.
 //!
 //! Exit codes: 0 done, 1 no value of a setting has the requested accuracy, 2 wrong input or unusable output. Progress, plans and errors go to standard error,
 //! results to standard output; `--json` makes the result one JSON object, and so an error.
 
 mod accuracy;
+mod args;
 mod bound;
 mod data_files;
 mod detect;
 mod estimate;
 mod flow;
+mod help;
 mod host;
 mod options;
 mod output;
 mod progress;
 mod retrieve;
 mod sweep;
-mod words;
 
 use crate::flow::{EXAMPLES, WakePreset};
 use crate::io::Existing;
@@ -25,6 +26,7 @@ use crate::plan::{Plan, Stage, Target};
 use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
 use crate::setup::efficiency_model::model;
 use crate::{Error, run, write};
+use args::FolderArgs;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 use output::paths;
@@ -34,27 +36,26 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wakescope_optics::plan::Model;
-use words::FolderWords;
 
 pub use host::{Answer, Host, Refusal, call, refusal};
 pub use options::command;
 
-/// Simulator of coherent Doppler lidar measurements of aircraft wake vortices.
+/// Simulate coherent Doppler lidar measurements of aircraft wake vortices.
 #[derive(Parser)]
 #[command(name = "wakescope", version)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Threads to compute with; the default is one for each core. Results do not depend on it.
+    /// Number of threads; one per core by default. Results do not change.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Seed to use instead of the scene's.
+    /// Random seed; by default that of the scene.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     seed: Option<u64>,
-    /// Show neither plan nor progress; `check` prints nothing of a good scene.
+    /// Suppress plan and progress; `check` prints errors only.
     #[arg(long, global = true)]
     quiet: bool,
-    /// Print the result as one JSON object, and an error as one on standard error.
+    /// Print the result, or the error, as one JSON object.
     #[arg(long, global = true)]
     json: bool,
     /// The program that runs the command, and what it gets.
@@ -67,79 +68,79 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Write a commented scene: the lidar of the chapter's Table 2 and an analytic vortex pair.
+    /// Write a commented scene file with every key and its default.
     Init {
-        /// The file to write.
+        /// Scene file to write.
         #[arg(default_value = "scene.toml")]
         scene: PathBuf,
-        /// Replace the file if it exists.
+        /// Replace an existing file.
         #[arg(long)]
         force: bool,
-        /// The lidar: a nominal set-up of a real one, with its sources.
+        /// Nominal set-up of a real lidar, with sources.
         #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(preset_names()))]
         preset: Option<String>,
     },
-    /// Check a scene and print the plan: what will run, what is left out and why, at what cost.
+    /// Check a scene; print its plan, run time and memory.
     Check(CheckArgs),
-    /// Run the whole measurement and write everything that the scene asks for.
+    /// Simulate the whole measurement and write all requested files.
     Run(Io),
-    /// Heterodyne efficiency and signal-to-noise ratio against range.
+    /// Compute heterodyne efficiency and signal-to-noise ratio against range.
     Efficiency(Io),
-    /// The raw signals of one realisation of the scan, or of all.
+    /// Simulate the raw signals of a scan.
     Signal(Io),
-    /// The radial-velocity map with its errors.
+    /// Simulate a radial-velocity map with its errors.
     Map(Io),
-    /// Velocities from raw signals of a file, simulated or measured, through the estimator of a scene.
-    Estimate(estimate::EstimateWords),
-    /// Circulation, place and core of the vortices in scans of any instrument.
-    Retrieve(retrieve::RetrieveWords),
-    /// The Cramer-Rao bound on the velocity, against signal-to-noise ratio and against range.
+    /// Estimate velocities from raw signals, simulated or measured.
+    Estimate(estimate::EstimateArgs),
+    /// Fit circulation, position and core of vortices to scans of any lidar.
+    Retrieve(retrieve::RetrieveArgs),
+    /// Print the Cramer-Rao bound of velocity against signal-to-noise ratio and range.
     Bound {
-        /// The scene.
+        /// Scene file.
         scene: PathBuf,
-        /// File for the whole table, as CSV.
+        /// CSV file for the whole table.
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
         /// Replace an existing file.
         #[arg(long)]
         overwrite: bool,
-        /// Compute even if the forecast of the memory is more than the machine has.
+        /// Run even if the memory forecast exceeds the machine's.
         #[arg(long)]
         allow_large: bool,
     },
-    /// The power budget in dB, from the energy of a pulse to the signal-to-noise ratio, with what bounds the instrument.
+    /// Print the power budget, from pulse energy to signal-to-noise ratio.
     Budget {
-        /// The scene.
+        /// Scene file.
         scene: PathBuf,
-        /// Ranges, m, such as 280,400; those of the beginning, the middle and the end of the scan without them.
-        #[arg(long, value_name = "M,M,...", value_delimiter = ',', value_parser = words::range)]
+        /// Ranges in m; by default start, middle and end of the scan.
+        #[arg(long, value_name = "M,M,...", value_delimiter = ',', value_parser = args::range)]
         range: Vec<f64>,
-        /// Folder for the table, budget.csv; made if it does not exist.
+        /// Output folder for budget.csv; created if missing.
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         /// Replace an existing table.
         #[arg(long)]
         overwrite: bool,
     },
-    /// Whether scans hold a wake, at a rate of false alarms; the smallest circulation that is found.
-    Detect(detect::DetectWords),
-    /// Run many scenes that differ in some keys: a table and pictures of what each gives.
+    /// Detect wakes at a given false-alarm rate; report the smallest detectable circulation.
+    Detect(detect::DetectArgs),
+    /// Run a scene with varied keys; tabulate and plot the results.
     Sweep {
-        /// The scene that all cases begin with.
+        /// Scene file that all cases are based on.
         #[arg(required_unless_present = "merge")]
         scene: Option<PathBuf>,
         #[command(flatten)]
         request: crate::sweep::Request,
-        /// Run nothing: make the tables from the results in these folders.
+        /// Run nothing; build the tables from results in these folders.
         #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "resume"])]
         merge: Vec<PathBuf>,
         #[command(flatten)]
         settings: crate::sweep::Settings,
-        /// Folder to write to; made if it does not exist.
+        /// Output folder; created if missing.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
-    /// Numerical error and run time of a scene or flow, setting by setting.
+    /// Report numerical error and run time of each setting.
     Accuracy {
         /// Scene file, or case file of a flow or wake.
         #[arg(required_unless_present = "preset")]
@@ -150,27 +151,27 @@ enum Command {
         #[command(flatten)]
         request: crate::accuracy::Request,
         #[command(flatten)]
-        folder: FolderWords,
+        folder: FolderArgs,
     },
-    /// Simulate a flow: a case file goes in, fields and checkpoints come out.
+    /// Simulate a flow from a case file; write fields and checkpoints.
     Flow {
-        /// The case file; --example prints one.
+        /// Case file; --example prints one.
         #[arg(required_unless_present = "example")]
         case: Option<PathBuf>,
         #[command(flatten)]
         run: flow::RunArgs,
-        /// Print a commented case file and do nothing else.
+        /// Print a commented case file and exit.
         #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "out"], value_parser = EXAMPLES.map(|(name, _)| name))]
         example: Option<String>,
     },
-    /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
+    /// Simulate an aircraft wake near the ground: preset or case file.
     Wake {
-        /// A case file with kind = "wake"; keys that it lacks are those of the preset.
+        /// Case file with kind = "wake"; the preset supplies missing keys.
         case: Option<PathBuf>,
-        /// How fine the flow is; coarse without one, unless a case file is given.
+        /// Resolution; coarse by default, unless a case file is given.
         #[arg(long, value_enum)]
         preset: Option<WakePreset>,
-        /// Print the case file and do nothing else.
+        /// Print the case file and exit.
         #[arg(long)]
         print: bool,
         #[command(flatten)]
@@ -180,11 +181,11 @@ enum Command {
 
 #[derive(Debug, Args)]
 struct Io {
-    /// The scene.
+    /// Scene file.
     scene: PathBuf,
     #[command(flatten)]
-    folder: FolderWords,
-    /// Run even if the forecast of the memory is more than the machine has.
+    folder: FolderArgs,
+    /// Run even if the memory forecast exceeds the machine's.
     #[arg(long)]
     allow_large: bool,
 }
@@ -192,29 +193,29 @@ struct Io {
 /// Arguments of `wakescope check`.
 #[derive(Debug, Args)]
 struct CheckArgs {
-    /// The scene.
+    /// Scene file.
     scene: PathBuf,
-    /// Folder that a run is to write to: check it, too.
+    /// Output folder of the run, to be checked too.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Accept a scene that needs more memory than the machine has.
+    /// Accept a memory forecast that exceeds the machine's.
     #[arg(long)]
     allow_large: bool,
-    /// Draw the set-up, from above and from behind, to this file, such as set-up.svg or set-up.png.
+    /// Draw the set-up to this SVG or PNG file.
     #[cfg(feature = "plots")]
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Replace the picture, and accept existing files in the folder.
+    /// Replace the picture; accept existing files in the folder.
     #[arg(long)]
     overwrite: bool,
 }
 
-/// Runs the program with the words of its command line, of which the first is its name; returns its exit code.
-pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
-    let words: Vec<OsString> = words.into_iter().collect();
-    let cli = match Cli::read(words.iter().cloned()) {
+/// Runs the program with the arguments of its command line, the first being its name; returns its exit code.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let cli = match Cli::read(args.iter().cloned()) {
         Ok(cli) => cli,
-        Err(e) => return output::explain(&e, words.iter().any(|word| word == "--json")),
+        Err(e) => return output::explain(&e, args.iter().any(|word| word == "--json")),
     };
     // All in one pool: forecasts count its threads, and files reuse the memory that the computing freed.
     match with_threads(&cli, || dispatch(&cli)).flatten() {
@@ -244,8 +245,8 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
         Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
         Command::Signal(io) => execute(io, Target::Signal, cli),
         Command::Map(io) => execute(io, Target::Map, cli),
-        Command::Estimate(words) => estimate::estimate(words, cli),
-        Command::Retrieve(words) => retrieve::retrieve(words, cli),
+        Command::Estimate(args) => estimate::estimate(args, cli),
+        Command::Retrieve(args) => retrieve::retrieve(args, cli),
         Command::Bound {
             scene,
             out,
@@ -261,7 +262,7 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
             out,
             overwrite,
         } => bound::budget(scene, range, out.as_deref(), *overwrite, cli),
-        Command::Detect(words) => detect::detect(words, cli),
+        Command::Detect(args) => detect::detect(args, cli),
         Command::Sweep {
             scene,
             request,

@@ -5,6 +5,7 @@
 //! of input; each changes what the command gives, or is refused.
 
 use super::Cli;
+use super::help::grouped;
 use crate::Error;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
@@ -128,7 +129,7 @@ const NOT_COMPARED: &str = "the results are compared with a sweep only if its sc
 
 /// The definition of the command line: commands, their arguments and options.
 pub fn command() -> clap::Command {
-    let mut command = Cli::command();
+    let mut command = grouped(Cli::command());
     command.build();
     command
 }
@@ -147,7 +148,7 @@ impl Cli {
     /// # Errors
     /// Arguments that the command line does not know, or of which one excludes another.
     pub(super) fn read(line: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
-        let matches = Self::command().try_get_matches_from(line)?;
+        let matches = grouped(Self::command()).try_get_matches_from(line)?;
         let mut cli = Self::from_arg_matches(&matches)?;
         if let Some((name, matches)) = matches.subcommand()
             && let Some(command) = command().find_subcommand(name)

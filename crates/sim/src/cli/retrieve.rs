@@ -1,14 +1,13 @@
 //! `wakescope retrieve`: vortices from scans, maps of any instrument or signals of a scene.
 
 use super::Cli;
+use super::args::{
+    AirArgs, FolderArgs, ScanArgs, Scans, Signals, is_signals, not_negative, positive, refuse_idle,
+};
 use super::data_files::{each_usable, is_of_the_file};
 use super::options::{
     BESIDE_GATE_STD, BESIDE_OWN_SCENE, BY_RADIAL_VELOCITIES, ESTIMATOR_BESIDE_GATE_STD, OF_MEANS,
     WITHOUT_SCENE, refusal_of_idle,
-};
-use super::words::{
-    AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive,
-    refuse_idle,
 };
 use crate::io::Provenance;
 use crate::io::scans::{ReadScan, are_of_one_plane, face_alike, plane_numbers, share_origin};
@@ -26,25 +25,25 @@ use std::path::{Path, PathBuf};
 use wakescope_estimate::retrieval::{EnvelopeResult, Flag, Gate, Movement, RetrievalOptions};
 use wakescope_estimate::vortex_fit::{CoreProfile, Secondary, Wake};
 
-/// Words of `wakescope retrieve`.
+/// Arguments of `wakescope retrieve`.
 #[derive(Debug, Args)]
-pub(super) struct RetrieveWords {
-    /// Maps of scans: CfRadial 1.4 (classic NetCDF), HALO .hpl, CSV; or raw signals, signals.nc, NPY or NPZ, with --scene.
+pub(super) struct RetrieveArgs {
+    /// Scans (CfRadial, HALO, WindCube, CSV), or raw signals with --scene.
     #[arg(required = true)]
     data: Vec<PathBuf>,
-    /// The scene of the instrument and its estimator; a map of this program has its own in it.
+    /// Scene of the instrument and estimator; maps of this program contain theirs.
     #[arg(long, value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
-    /// How velocities were estimated, without a scene: a method of scenes such as periodogram or first_moment, or means over the gates.
+    /// Velocity estimator without a scene, e.g. periodogram; gate means by default.
     #[arg(long, value_name = "METHOD", conflicts_with = "scene")]
     estimator: Option<String>,
-    /// Full width of the pulse at half its maximum, s, e.g. 200e-9; of the file without it.
+    /// Full pulse width at half maximum in s; by default the file's.
     #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "scene")]
     pulse: Option<f64>,
-    /// Length of the estimator's window, s, e.g. 256e-9; of the gates without it.
+    /// Estimator window length in s; by default the gate length.
     #[arg(long, value_name = "S", value_parser = positive, requires = "estimator", conflicts_with = "scene")]
     window: Option<f64>,
-    /// Weighting of that window, as in scenes; rectangular without it.
+    /// Weighting of that window; rectangular by default.
     #[arg(
         long,
         value_name = "WORD",
@@ -52,33 +51,33 @@ pub(super) struct RetrieveWords {
         conflicts_with = "scene"
     )]
     weighting: Option<String>,
-    /// How circulations are found.
+    /// Retrieval method.
     #[arg(long, value_enum, default_value_t)]
     method: Method,
     #[command(flatten)]
-    air: AirWords,
-    /// Circulation against radius; of the scene without it, else algebraic.
+    air: AirArgs,
+    /// Vortex profile; by default the scene's, or algebraic.
     #[arg(long, value_enum)]
     profile: Option<CoreProfile>,
-    /// Core radius that is kept, m; fitted without it.
+    /// Fixed core radius in m; fitted by default.
     #[arg(long, value_name = "M", value_parser = positive)]
     core: Option<f64>,
-    /// Whether secondary vortices are fitted beside a pair: where a scan shows them, never, or always; of the scene without it, else auto.
+    /// Fit secondary vortices; by default the scene's, or auto.
     #[arg(long, value_enum)]
     secondary: Option<Secondary>,
-    /// Whether vortices move while a scan lasts: whichever fits better, yes, or no.
+    /// Vortex motion during a scan: whichever fits better, yes, or no.
     #[arg(long, value_enum, default_value_t = Movement::Auto)]
     motion: Movement,
-    /// Detection threshold: minimum drop in chi-square relative to a wind-only fit; 22, or 35 for maps of a known estimator.
+    /// Minimum chi-square drop from a wind-only fit; 22, known estimator 35.
     #[arg(long, value_name = "T", value_parser = not_negative)]
     threshold: Option<f64>,
-    /// Height of the lidar above the ground, m; of the scene without it, else 0.
+    /// Lidar height above ground in m; by default the scene's, or 0.
     #[arg(long, value_name = "M", value_parser = not_negative)]
     lidar_height: Option<f64>,
     #[command(flatten)]
-    scans: ScanWords,
+    scans: ScanArgs,
     #[command(flatten)]
-    folder: FolderWords,
+    folder: FolderArgs,
 }
 
 /// Sampling of an instrument of which it is not known, Hz.
@@ -87,7 +86,7 @@ const WIDE_HZ: f64 = 500e6;
 /// Few lines cross a core, and the likelihood of their speckle is no parabola.
 const HEIGHTS: &str = "fits of signals state the deviations of heights a quarter too small\n";
 
-impl RetrieveWords {
+impl RetrieveArgs {
     /// Refuses options that have no effect on the files or beside other options.
     fn refuse_idle(&self, cli: &Cli) -> Result<(), Error> {
         refuse_idle(&self.data, cli)?;
@@ -205,19 +204,19 @@ struct Found {
     tracks: Vec<PlaneTrack>,
 }
 
-pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
-    words.refuse_idle(cli)?;
-    let stated = words
+pub(super) fn retrieve(args: &RetrieveArgs, cli: &Cli) -> Result<(), Error> {
+    args.refuse_idle(cli)?;
+    let stated = args
         .scene
         .as_deref()
         .map(|path| cli.scene(path))
         .transpose()?;
     let observer = cli.observer();
-    let mut inputs = each_usable(&words.data, &*observer, |path| {
-        Input::read(words, path, stated.as_ref(), &*observer)
+    let mut inputs = each_usable(&args.data, &*observer, |path| {
+        Input::read(args, path, stated.as_ref(), &*observer)
     })?;
     for input in &inputs {
-        input.refuse_idle(words, cli)?;
+        input.refuse_idle(args, cli)?;
     }
     let mut scans: Vec<&mut ReadScan> = Vec::new();
     for input in &mut inputs {
@@ -231,15 +230,14 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         ));
     }
     let planes = plane_numbers(scans.iter().map(|scan| &**scan));
-    words
-        .folder
-        .prepare(cli, |files| list(words.method, &planes, None, files))?;
+    args.folder
+        .prepare(cli, |files| list(args.method, &planes, None, files))?;
     let scenes: Vec<_> = inputs.iter().map(|input| input.scene.clone()).collect();
     observer.begin(Stage::Retrieval, planes.len() as u64);
-    let mut found = of_inputs(words, inputs, planes.len(), &*observer)?;
+    let mut found = of_inputs(args, inputs, planes.len(), &*observer)?;
     observer.end();
     found.tracks = retrieve::tracks_of(&found.scans)?;
-    let is_of_signals = words.method == Method::Signals
+    let is_of_signals = args.method == Method::Signals
         && found
             .scans
             .iter()
@@ -249,17 +247,17 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         (Default::default(), provenance(&scenes)),
         json!({ "scans": retrieve::json(&found.scans) }),
     );
-    words.folder.finish(
+    args.folder.finish(
         cli,
         of,
-        |files| list(words.method, &planes, Some(&found), files),
+        |files| list(args.method, &planes, Some(&found), files),
         (object, text),
     )
 }
 
 /// What is found in the scans of all files, `count` in number; of several those that cannot be fitted are left out with a warning.
 fn of_inputs(
-    words: &RetrieveWords,
+    args: &RetrieveArgs,
     inputs: Vec<Input>,
     count: usize,
     observer: &dyn Observer,
@@ -268,12 +266,12 @@ fn of_inputs(
     let mut refused = None;
     for Input { scans, scene } in inputs {
         if let Some(signals) = scans.signals {
-            of_signals(words, scans.maps, signals, &mut found, observer)?;
+            of_signals(args, scans.maps, signals, &mut found, observer)?;
             continue;
         }
         for scan in scans.maps {
             let start = prediction(&found.scans, &scan);
-            match of_map(words, scene.as_ref(), scan, start, observer) {
+            match of_map(args, scene.as_ref(), scan, start, observer) {
                 Ok(one) => found.scans.push(one),
                 Err(error) if count > 1 && is_of_the_file(&error) => {
                     observer.warn(&format!("{error}: left out"));
@@ -298,8 +296,8 @@ struct Input {
 
 impl Input {
     /// Refuses options in whose place the scene of the file is taken.
-    fn refuse_idle(&self, words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
-        let states_estimator = words.estimator.as_deref().is_some_and(|name| name != MEANS);
+    fn refuse_idle(&self, args: &RetrieveArgs, cli: &Cli) -> Result<(), Error> {
+        let states_estimator = args.estimator.as_deref().is_some_and(|name| name != MEANS);
         match self.scans.maps.first() {
             Some(scan) if self.scene.is_some() && !states_estimator => {
                 cli.refuse_idle(&scan.path, BESIDE_OWN_SCENE)
@@ -309,12 +307,12 @@ impl Input {
     }
 
     fn read(
-        words: &RetrieveWords,
+        args: &RetrieveArgs,
         path: &Path,
         stated: Option<&SceneFile>,
         observer: &dyn Observer,
     ) -> Result<Self, Error> {
-        if matches!(words.method, Method::Signals | Method::Envelope) && !is_signals(path) {
+        if matches!(args.method, Method::Signals | Method::Envelope) && !is_signals(path) {
             let reason =
                 "it is no file of raw signals, which this method needs: --method fit takes maps"
                     .into();
@@ -323,8 +321,8 @@ impl Input {
                 reason,
             });
         }
-        let keeps_spectra = words.method == Method::Envelope;
-        let scans = words.scans.read(path, stated, keeps_spectra, observer)?;
+        let keeps_spectra = args.method == Method::Envelope;
+        let scans = args.scans.read(path, stated, keeps_spectra, observer)?;
         let known = scans.signals.as_ref().map(|signals| &signals.plan.scene);
         let scene = match (known.or(stated), scans.maps.first()) {
             (Some(scene), _) => Some(scene.clone()),
@@ -362,24 +360,24 @@ const UNKNOWN: &str = "velocities are taken for means over the gates: those of s
                        --scene everything";
 
 fn of_map(
-    words: &RetrieveWords,
+    args: &RetrieveArgs,
     scene: Option<&SceneFile>,
     mut scan: ReadScan,
     start: Option<Wake>,
     observer: &dyn Observer,
 ) -> Result<RetrievedScan, Error> {
-    scan.pulse_width_s = words.pulse.or(scan.pulse_width_s);
-    let are_means = words.estimator.as_deref() == Some(MEANS) || words.air.gate_std == Some(0.0);
+    scan.pulse_width_s = args.pulse.or(scan.pulse_width_s);
+    let are_means = args.estimator.as_deref() == Some(MEANS) || args.air.gate_std == Some(0.0);
     // What is stated goes before what the file says.
-    let (instrument, is_likely) = match (words.air.gate_std, &words.estimator, scene) {
+    let (instrument, is_likely) = match (args.air.gate_std, &args.estimator, scene) {
         _ if are_means => (None, false),
         (None, None, Some(scene)) => (Some(scene.clone()), false),
-        (None, Some(_), _) => (Some(words.stated_scene(&scan)?), false),
-        (None, None, None) if scan.is_own => (Some(words.stated_scene(&scan)?), true),
+        (None, Some(_), _) => (Some(args.stated_scene(&scan)?), false),
+        (None, None, None) if scan.is_own => (Some(args.stated_scene(&scan)?), true),
         _ => (None, false),
     };
     let of_gate = instrument.as_ref().or(scene).map(|file| &file.content);
-    let (gate, remark) = gate_of(Some(&scan), words.air.gate_std, of_gate)?;
+    let (gate, remark) = gate_of(Some(&scan), args.air.gate_std, of_gate)?;
     let own = instrument
         .as_ref()
         .map(|scene| SceneResponse::of_scene(scene, &Silent))
@@ -391,12 +389,12 @@ fn of_map(
         None if are_means => Velocities::Means,
         None => Velocities::Unknown,
     };
-    words.refuse_idle_on(&scan, velocities)?;
+    args.refuse_idle_on(&scan, velocities)?;
     let options = RetrievalOptions {
         start,
-        ..words.options(scene, gate)
+        ..args.options(scene, gate)
     };
-    let (found, implausible) = retrieve::retrieve_map(scan, words.method, options, velocities)?;
+    let (found, implausible) = retrieve::retrieve_map(scan, args.method, options, velocities)?;
     let lost = "it is a map of this program that has lost its scene, as some programs drop it: the estimator is taken for the default one, and \
                 the deviations hold what means would differ by; --scene gives the circulations of the original";
     let taken = found.result.has(Flag::TakenForMeans);
@@ -415,7 +413,7 @@ fn no_wake_since(scan: &ReadScan, reason: &str) -> String {
 }
 
 fn of_signals(
-    words: &RetrieveWords,
+    args: &RetrieveArgs,
     maps: Vec<ReadScan>,
     signals: Signals,
     found: &mut Found,
@@ -432,12 +430,12 @@ fn of_signals(
     let mut first_line = 0;
     for (mut scan, measured) in maps.into_iter().zip(&scans) {
         scan.azimuth_rad = Some(plan.scene.content.scan.azimuth_rad);
-        words.refuse_idle_on(&scan, velocities)?;
-        let (gate, _) = gate_of(Some(&scan), words.air.gate_std, Some(&plan.scene.content))?;
+        args.refuse_idle_on(&scan, velocities)?;
+        let (gate, _) = gate_of(Some(&scan), args.air.gate_std, Some(&plan.scene.content))?;
         let (mut one, implausible) = retrieve::retrieve_map(
             scan,
-            words.method,
-            words.options(Some(&plan.scene), gate),
+            args.method,
+            args.options(Some(&plan.scene), gate),
             velocities,
         )?;
         if let Some(reason) = implausible {
@@ -446,7 +444,7 @@ fn of_signals(
         }
         let lines = first_line..first_line + measured.lines.elevation_rad.len();
         first_line = lines.end;
-        match (&own, words.method) {
+        match (&own, args.method) {
             (Some(own), Method::Signals) => {
                 one = retrieve::retrieve_signals(own, &mut records, measured, one, observer)?
             }

@@ -22,19 +22,19 @@ pub const MOST_CASES: usize = 10_000;
 #[derive(Debug, Clone, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct Request {
-    /// A key and its values: KEY=a,b,c or KEY=lin:FIRST:LAST:COUNT or KEY=log:FIRST:LAST:COUNT; the last --vary is fastest.
+    /// KEY=a,b,c or KEY=lin:FIRST:LAST:COUNT or KEY=log:FIRST:LAST:COUNT; the last varies fastest.
     #[cfg_attr(feature = "cli", arg(long, value_name = "KEY=VALUES"))]
     pub vary: Vec<String>,
-    /// A table of cases: a column for each key, a row for each case.
+    /// CSV table of cases: one column per key, one row per case.
     #[cfg_attr(feature = "cli", arg(long = "cases", value_name = "FILE.csv"))]
     pub list: Option<PathBuf>,
-    /// A key by arithmetic on others, e.g. "pulse.energy_j = 0.06/laser.pulse_repetition_hz".
+    /// Key computed from others, e.g. "pulse.energy_j = 0.06/laser.pulse_repetition_hz".
     #[cfg_attr(feature = "cli", arg(long = "let", value_name = "KEY = EXPRESSION"))]
     pub lets: Vec<String>,
-    /// Leave out the cases for which this does not hold, e.g. "pulse.energy_j*laser.pulse_repetition_hz <= 2".
+    /// Skip cases that violate this, e.g. "pulse.energy_j*laser.pulse_repetition_hz <= 2".
     #[cfg_attr(feature = "cli", arg(long = "where", value_name = "CONDITION"))]
     pub conditions: Vec<String>,
-    /// A seed for each case; without it all have the scene's, and differences between cases are the clearer.
+    /// Use a different seed per case; by default one seed for all.
     #[cfg_attr(feature = "cli", arg(long))]
     pub independent: bool,
     /// Seed in place of the scene's.

@@ -59,16 +59,16 @@ impl std::str::FromStr for Shard {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct Settings {
-    /// Run part NUMBER of COUNT of the cases, e.g. 2/8; --merge makes the tables of all.
+    /// Run part NUMBER of COUNT, e.g. 2/8; --merge builds the tables.
     #[cfg_attr(feature = "cli", arg(long, value_name = "NUMBER/COUNT"))]
     pub shard: Option<Shard>,
-    /// Leave cases as they are whose result is there.
+    /// Skip cases whose results exist.
     #[cfg_attr(feature = "cli", arg(long))]
     pub resume: bool,
-    /// Leave out the fits of the circulation, which take longer than the maps where regions are small.
+    /// Skip the circulation fits, which may take longer than the maps.
     #[cfg_attr(feature = "cli", arg(long))]
     pub no_circulation: bool,
-    /// Run even if the forecast of the memory of a case is more than the machine has.
+    /// Run even if a case's memory forecast exceeds the machine's.
     #[cfg_attr(feature = "cli", arg(long))]
     pub allow_large: bool,
     /// Replace existing files, also those of another sweep.

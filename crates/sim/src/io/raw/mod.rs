@@ -32,10 +32,10 @@ use wakescope_estimate::window::FILL_VALUES;
 #[derive(Debug, Clone, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct RawFormat {
-    /// Numbers of a binary file.
+    /// Number type of a binary file.
     #[cfg_attr(feature = "cli", arg(id = "format", long, value_name = "KIND", value_parser = KINDS))]
     pub number: Option<String>,
-    /// Their byte order: the lowest or the highest byte first.
+    /// Byte order of a binary file.
     #[cfg_attr(
         feature = "cli",
         arg(long, value_enum, default_value_t, requires = "format")
@@ -44,7 +44,7 @@ pub struct RawFormat {
     /// Samples are pairs of numbers, in phase and quadrature.
     #[cfg_attr(feature = "cli", arg(long))]
     pub complex: bool,
-    /// Which index runs fastest: `line, pulse, sample`, `pulse, line, sample` or `sample, line, pulse`.
+    /// Order of the indices, the last running fastest.
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub order: Order,
     /// Bytes before the first number.
@@ -53,10 +53,10 @@ pub struct RawFormat {
         arg(long, value_name = "N", default_value_t = 0, requires = "format")
     )]
     pub header_bytes: u64,
-    /// The variable of a NetCDF file, or the array of an NPZ file, that holds the samples.
+    /// NetCDF variable or NPZ array of the samples.
     #[cfg_attr(feature = "cli", arg(long, value_name = "NAME"))]
     pub variable: Option<String>,
-    /// The variable of a NetCDF file that holds the second quadrature.
+    /// NetCDF variable of the second quadrature.
     #[cfg_attr(feature = "cli", arg(long, value_name = "NAME"))]
     pub quadrature: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! What words of several commands have in common: where files go, scans that are read, and how numbers are written.
+//! Arguments that several commands share: output folder, how scans are read, how numbers are written.
 
 use super::Cli;
 use super::options::{ON_SIGNALS, ON_VELOCITIES, refusal_of_idle};
@@ -24,16 +24,16 @@ use wakescope_estimate::retrieval::Turbulence;
 
 /// The folder of a command.
 #[derive(Debug, Args)]
-pub(super) struct FolderWords {
-    /// Folder to write to; made if it does not exist.
+pub(super) struct FolderArgs {
+    /// Output folder; created if missing.
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// Replace existing files in the folder.
+    /// Replace existing files in the output folder.
     #[arg(long)]
     overwrite: bool,
 }
 
-impl FolderWords {
+impl FolderArgs {
     fn existing(&self) -> Existing {
         Existing::with_overwrite(self.overwrite)
     }
@@ -71,31 +71,31 @@ impl FolderWords {
 
 /// What is known of the air and of the gates.
 #[derive(Debug, Args)]
-pub(super) struct AirWords {
-    /// Standard deviation, m/s, and length, m, of turbulence that neighbouring velocities share, e.g. 1.2,25.
+pub(super) struct AirArgs {
+    /// Standard deviation in m/s and length scale in m of turbulence.
     #[arg(long, value_name = "SIGMA,LENGTH", value_parser = turbulence)]
     pub(super) turbulence: Option<Turbulence>,
-    /// Standard deviation of the weight of a gate along the line, m, for velocities that are taken for means; 0 for those at points.
+    /// Standard deviation of the gate's range weighting in m; 0 for points.
     #[arg(long, value_name = "M", value_parser = not_negative)]
     pub(super) gate_std: Option<f64>,
-    /// Whether image vortices make the ground a streamline.
+    /// Image vortices below the ground.
     #[arg(long = "ground", action = ArgAction::Set, default_value = "yes", value_parser = switch(["yes", "no"]))]
     pub(super) images: bool,
 }
 
 /// How scans of files are read.
 #[derive(Debug, Args)]
-pub(super) struct ScanWords {
-    /// What raw samples are multiplied with, such as ampere per count; the noise is then that of the scene.
+pub(super) struct ScanArgs {
+    /// Scale factor of raw samples; the noise is then the scene's.
     #[arg(long, value_name = "A", value_parser = positive)]
     scale: Option<f64>,
-    /// The variable or column that holds the velocities.
+    /// Variable or column of the velocities.
     #[arg(long, value_name = "NAME")]
     field: Option<String>,
-    /// Velocities are positive towards the lidar; raw signals: frequencies rise with velocities towards it.
+    /// Velocities are positive, or frequencies rise, towards the lidar.
     #[arg(long)]
     towards: bool,
-    /// Leave out velocities below this signal-to-noise ratio, dB.
+    /// Skip velocities below this signal-to-noise ratio in dB.
     #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = finite)]
     min_snr: Option<f64>,
 }
@@ -103,7 +103,7 @@ pub(super) struct ScanWords {
 /// What a file of scans holds.
 pub(super) struct Scans {
     pub(super) maps: Vec<ReadScan>,
-    /// What was left out or not understood, in words.
+    /// What was skipped or not understood.
     pub(super) left_out: Vec<String>,
     /// The raw signals that the maps are made of.
     pub(super) signals: Option<Signals>,
@@ -117,7 +117,7 @@ pub(super) struct Signals {
     pub(super) spectra: Option<Spectra>,
 }
 
-impl ScanWords {
+impl ScanArgs {
     /// The scans of a file; raw signals go through the estimator of the scene, whose spectra are kept if asked for.
     pub(super) fn read(
         &self,
