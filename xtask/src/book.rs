@@ -4,6 +4,7 @@
 //! their results.
 
 use crate::process::call;
+use crate::profile::Profile;
 use crate::workspace::{built, root};
 use crate::{audit, left_out, work_precision};
 use fixtures::failure::Outcome;
@@ -56,7 +57,7 @@ pub(crate) fn run() -> Outcome {
 fn write_results(pages: &Path) -> Outcome {
     std::fs::write(pages.join(AUDIT), audit::page()?)?;
     std::fs::write(pages.join(LEFT_OUT), left_out::page()?)?;
-    let rows = work_precision::measure(None, false)?;
+    let rows = work_precision::measure(None, Profile::Full)?;
     let origin = work_precision::provenance_of_run(false);
     let csv = work_precision::table(&rows).to_csv(&origin)?;
     let svg = work_precision::picture(&rows).svg(&origin)?;

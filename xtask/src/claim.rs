@@ -16,6 +16,8 @@ pub(crate) struct Claim {
     pub(crate) statement: String,
     pub(crate) expected: String,
     pub(crate) measured: String,
+    /// What else was measured.
+    pub(crate) beside: String,
     /// NaN where the measurement is deterministic.
     pub(crate) standard_error: f64,
     pub(crate) verdict: Verdict,
@@ -45,11 +47,6 @@ impl Part {
             unit,
             bar,
         }
-    }
-
-    /// The name and the number without a mark between them.
-    pub(crate) fn words(&self) -> String {
-        format!("{} {}{}", self.name, self.found.words(), self.unit)
     }
 }
 
@@ -92,6 +89,9 @@ struct Listed {
     check: bool,
     /// The chapter's sentence, word for word; none of the program's own claims.
     quote: Option<String>,
+    /// What the measured value of the chapter's is.
+    #[serde(default)]
+    label: String,
     /// Where the chapter's is judged, and what of that it does not say.
     #[serde(default)]
     case: String,
@@ -118,6 +118,7 @@ impl Claim {
             statement: String::new(),
             expected: String::new(),
             measured,
+            beside: String::new(),
             standard_error: f64::NAN,
             verdict: Verdict::of(pass),
             decided_by: String::new(),
@@ -198,19 +199,37 @@ impl Claim {
         }
     }
 
+    /// The sentence of the chapter, word for word; none of the program's own claims.
+    pub(crate) fn quote(&self) -> Option<&'static str> {
+        self.listed()?.quote.as_deref()
+    }
+
+    /// Where the statement of the chapter is judged, and what of that the chapter does not say.
+    pub(crate) fn case(&self) -> &'static str {
+        self.listed().map_or("", |listed| listed.case.as_str())
+    }
+
+    /// What was measured in one phrase: of several parts the one that decides.
+    pub(crate) fn value(&self) -> String {
+        let decisive = self.measured.split("; ").next().unwrap_or("");
+        match self.listed().map_or("", |listed| listed.label.as_str()) {
+            "" => decisive.into(),
+            label => format!("{label}: {decisive}"),
+        }
+    }
+
+    /// Everything that was measured.
+    pub(crate) fn all_measured(&self) -> String {
+        if self.beside.is_empty() {
+            return self.measured.clone();
+        }
+        format!("{} ({})", self.measured, self.beside)
+    }
+
     /// The sentence and its case, or what else the claim comes from.
     pub(crate) fn source(&self) -> String {
-        match (self.kind(), self.listed()) {
-            (
-                Kind::Chapter,
-                Some(Listed {
-                    quote: Some(quote),
-                    case,
-                    ..
-                }),
-            ) => {
-                format!("\"{quote}\" Judged at: {case}.")
-            }
+        match (self.kind(), self.quote()) {
+            (_, Some(quote)) => format!("\"{quote}\" Judged at: {}.", self.case()),
             (Kind::Check, _) => {
                 "arithmetic, a copy or geometry: cannot fail unless the program is wrong".into()
             }
@@ -232,29 +251,12 @@ impl Claim {
         }
     }
 
-    /// The claim with what is told beside it.
+    /// The claim with what else was measured.
     pub(crate) fn beside(self, words: &str) -> Self {
         Self {
-            measured: format!("{} ({words})", self.measured),
+            beside: words.into(),
             ..self
         }
-    }
-}
-
-impl fmt::Display for Claim {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            id,
-            statement,
-            expected,
-            measured,
-            ..
-        } = self;
-        write!(
-            f,
-            "{:<12} {id:<4} {statement}: expected {expected}, measured {measured}",
-            self.verdict.name()
-        )
     }
 }
 
@@ -304,13 +306,10 @@ mod tests {
         for Listed { id, .. } in &LIST.claim {
             assert!(code.contains(&format!("\"{id}\"")), "no figure claims {id}");
         }
-        assert_eq!(
-            LIST.claim
-                .iter()
-                .filter(|listed| listed.quote.is_some())
-                .count(),
-            19
-        );
+        let is_quoted = |listed: &&Listed| listed.quote.is_some();
+        assert_eq!(LIST.claim.iter().filter(is_quoted).count(), 19);
+        let is_labelled = |listed: &Listed| listed.quote.is_some() != listed.label.is_empty();
+        assert!(LIST.claim.iter().all(is_labelled));
         // And every claim of a figure is on the list.
         let is_claim = |word: &&str| {
             let number = word

@@ -36,6 +36,8 @@ pub(crate) struct Figure {
     pub(crate) id: &'static str,
     pub(crate) number: u32,
     pub(crate) title: &'static str,
+    /// Processor time with the profile quick, about, on a slow core \[s\].
+    pub(crate) quick_core_s: f64,
     pub(crate) make: Make,
 }
 
@@ -51,14 +53,19 @@ pub(crate) enum Lane {
 }
 
 impl Figure {
-    /// Its own number, by which `--only` asks for it, and what it is called.
-    pub(crate) fn heading(&self) -> String {
+    /// What it is, with the number by which `--only` selects it.
+    pub(crate) fn numbered(&self) -> String {
         let kind = if self.id.starts_with("tab") {
             "Table"
         } else {
             "Figure"
         };
-        format!("{kind} {}: {}", self.number, self.title)
+        format!("{kind} {}", self.number)
+    }
+
+    /// Number and title.
+    pub(crate) fn heading(&self) -> String {
+        format!("{}: {}", self.numbered(), self.title)
     }
 
     /// The words of its caption with the values of a run.
@@ -99,11 +106,18 @@ pub(crate) fn filled(text: &str, values: &[String]) -> Option<String> {
 
 type Make = fn(&Context) -> Result<Rendered, Failure>;
 
-const fn figure(id: &'static str, number: u32, title: &'static str, make: Make) -> Figure {
+const fn figure(
+    id: &'static str,
+    number: u32,
+    title: &'static str,
+    quick_core_s: f64,
+    make: Make,
+) -> Figure {
     Figure {
         id,
         number,
         title,
+        quick_core_s,
         make,
     }
 }
@@ -114,76 +128,117 @@ pub(crate) const ALL: [Figure; 21] = [
         "fig01",
         1,
         "Vertical velocity through the cores of the pair",
+        0.1,
         fig01::make,
     ),
     figure(
         "tab01",
         1,
         "ICAO separations behind a landing aircraft",
+        0.1,
         tab01::make,
     ),
     figure(
         "tab02",
         2,
         "Lidar parameters as read back from the scene that was run",
+        0.1,
         tab02::make,
     ),
-    figure("fig03", 3, "Scan pattern across the runway", fig03::make),
+    figure(
+        "fig03",
+        3,
+        "Scan pattern across the runway",
+        0.1,
+        fig03::make,
+    ),
     figure(
         "fig04",
         4,
         "Signal-to-noise ratio and system efficiency",
+        17.0,
         fig04::make,
     ),
-    figure("fig05", 5, "M'4 stencil on a line of sight", fig05::make),
-    figure("fig06", 6, "Surfaces of equal vorticity", fig06::make),
+    figure(
+        "fig05",
+        5,
+        "M'4 stencil on a line of sight",
+        0.1,
+        fig05::make,
+    ),
+    figure("fig06", 6, "Surfaces of equal vorticity", 44.0, fig06::make),
     figure(
         "fig07",
         7,
         "Circulation and paths of the vortices",
+        0.1,
         fig07::make,
     ),
     figure(
         "fig08",
         8,
         "Radial velocity of the wake, early and late",
+        5.0,
         fig08::make,
     ),
-    figure("fig09", 9, "Accumulation level against range", fig09::make),
-    figure("fig10", 10, "Estimation error and gradient", fig10::make),
-    figure("fig11", 11, "Estimated map, late, 400 ns", fig11::make),
-    figure("fig12", 12, "Error against pulse energy", fig12::make),
+    figure(
+        "fig09",
+        9,
+        "Accumulation level against range",
+        0.1,
+        fig09::make,
+    ),
+    figure(
+        "fig10",
+        10,
+        "Estimation error and gradient",
+        8.0,
+        fig10::make,
+    ),
+    figure(
+        "fig11",
+        11,
+        "Estimated map, late, 400 ns",
+        10.0,
+        fig11::make,
+    ),
+    figure("fig12", 12, "Error against pulse energy", 20.0, fig12::make),
     figure(
         "fig13",
         13,
         "Correlogram against periodogram accumulation",
+        26.0,
         fig13_14::make_13,
     ),
     figure(
         "fig14",
         14,
-        "The same at 200 and 400 ns about the centre",
+        "Both accumulations in weak turbulence",
+        20.0,
         fig13_14::make_14,
     ),
-    figure("fig15", 15, "Error against run time", fig15::make),
-    figure("fig16", 16, "Stiff and extreme cases", fig16::make),
+    figure("fig15", 15, "Error against run time", 28.0, fig15::make),
+    figure("fig16", 16, "Stiff and extreme cases", 40.0, fig16::make),
     figure(
         "fig17",
         17,
         "Circulation and positions from single scans",
+        30.0,
         fig17::make,
     ),
     figure(
         "fig18",
         18,
         "Velocity estimators against the Cramer-Rao bound",
+        10.0,
         fig18::make,
     ),
-    figure("fig19", 19, "Detection of wakes", fig19::make),
+    figure("fig19", 19, "Detection of wakes", 21.0, fig19::make),
     figure(
         "fig25",
         25,
         "Where correlogram accumulation errs less",
+        28.0,
         fig25::make,
     ),
 ];

@@ -1,8 +1,8 @@
 //! `cargo xtask reproduce-figs`: draws the figures, measures the claims, writes one report.
 //!
 //! Each figure is written as soon as it is made, and kept in a cache whose key is what it depends on: a second run draws
-//! only what has changed, and an interrupted one goes on where it was. Figures of the wake are drawn beside the others, for each
-//! leaves a core idle at times; those that measure times come last, alone.
+//! only what has changed, and an interrupted one goes on where it was. Two figures are drawn at a time; those that measure
+//! times come last, alone.
 
 mod cache;
 mod report;
@@ -11,13 +11,15 @@ use crate::claim::{Claim, Kind};
 use crate::cost::clock_s;
 use crate::figures::context::{Context, Rendered, column};
 use crate::figures::{self, Figure, Lane};
+use crate::profile::Profile;
 use crate::statistics::Verdict;
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::ThreadPool;
 use rustix::time::ClockId;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 use wakescope_sim::io::{Table, write_atomic};
 
@@ -36,27 +38,31 @@ pub(crate) fn run(
     let out = out.unwrap_or_else(|| root().join("target/figures"));
     std::fs::create_dir_all(&out)
         .map_err(|e| Failure::new(format!("cannot write to {}: {e}", out.display())))?;
-    let start = Instant::now();
-    let bar = progress_bar(chosen.len() as u64);
     let run = Run {
         chosen: &chosen,
         context,
-        threads,
+        threads: match threads {
+            0 => std::thread::available_parallelism()?.get(),
+            threads => threads,
+        },
         out: &out,
-        bar: &bar,
+        start: Instant::now(),
+        is_taken: chosen.iter().map(|_| AtomicBool::new(false)).collect(),
+        finished: AtomicUsize::new(0),
     };
-    let mut done = if threads == 0 {
-        run.draw_side_by_side()?
-    } else {
-        // No more threads than were requested.
-        let mut done = run.draw(Lane::Wake)?;
-        done.extend(run.draw(Lane::Formula)?);
-        done
-    };
-    done.extend(run.draw(Lane::Alone)?);
+    run.announce()?;
+    let mut done = run.draw_side_by_side()?;
+    done.extend(run.draw(&[Lane::Alone], 1)?);
     done.sort_by_key(|(figure, _)| figures::ALL.iter().position(|of| of.id == figure.id));
-    bar.finish_and_clear();
-    finish(&out, context, &done, start.elapsed().as_secs_f64())
+    finish(&out, context, &done, run.start.elapsed().as_secs_f64())
+}
+
+/// Prints a line at once, also into a file or a pipe.
+fn say(line: &str) -> Outcome {
+    let mut stdout = std::io::stdout().lock();
+    writeln!(stdout, "{line}")?;
+    stdout.flush()?;
+    Ok(())
 }
 
 /// Figures with what they gave.
@@ -68,65 +74,133 @@ struct Run<'r> {
     context: &'r Context,
     threads: usize,
     out: &'r Path,
-    bar: &'r ProgressBar,
+    start: Instant,
+    /// Which of the chosen figures are being drawn or are drawn.
+    is_taken: Vec<AtomicBool>,
+    /// Number of figures that are written.
+    finished: AtomicUsize,
 }
 
 impl Run<'_> {
-    /// Figures of the wake and those of formulas at once.
+    /// Says what will be drawn, how long it takes and where the report will be.
+    fn announce(&self) -> Outcome {
+        let mut cached = 0;
+        let mut core_s = 0.0;
+        for figure in self.chosen {
+            if self.cached(figure)?.is_some() {
+                cached += 1;
+            } else {
+                core_s += figure.quick_core_s;
+            }
+        }
+        let profile = self.context.profile;
+        let from_cache = match cached {
+            0 => String::new(),
+            cached => format!(" ({cached} from the cache)"),
+        };
+        say(&format!(
+            "Drawing {} figures and tables of the chapter{from_cache} with the profile {}: {}.",
+            self.chosen.len(),
+            profile.name(),
+            run_time(profile, core_s, self.threads)
+        ))?;
+        say(&format!(
+            "Report: {}",
+            self.out.join("index.html").display()
+        ))
+    }
+
+    /// Two figures at a time, each with half of the threads, so that one goes on while the threads of the other wait for
+    /// each other. One side begins with the figures of the wake, since the first of them
+    /// may have to run it, the other one with the rest.
     fn draw_side_by_side(&self) -> Result<Done, Failure> {
+        let half = self.threads / 2;
+        if half == 0 {
+            return self.draw(&[Lane::Wake, Lane::Formula], self.threads);
+        }
         std::thread::scope(|scope| {
-            let beside = scope.spawn(|| self.draw(Lane::Wake));
-            let formulas = self.draw(Lane::Formula);
+            let beside = scope.spawn(|| self.draw(&[Lane::Wake, Lane::Formula], half));
+            let here = self.draw(&[Lane::Formula, Lane::Wake], self.threads - half);
             let mut done = beside
                 .join()
-                .map_err(|_| Failure::new("a figure of the wake panicked".into()))??;
-            done.extend(formulas?);
+                .map_err(|_| Failure::new("a figure panicked".into()))??;
+            done.extend(here?);
             Ok(done)
         })
     }
 
-    /// The chosen figures of a lane, one after the other.
-    fn draw(&self, lane: Lane) -> Result<Done, Failure> {
+    /// The chosen figures of some lanes that nobody else has taken, one after the other.
+    fn draw(&self, lanes: &[Lane], threads: usize) -> Result<Done, Failure> {
         let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(self.threads)
+            .num_threads(threads)
             .build()?;
         let mut done = Vec::new();
-        for figure in self.chosen {
-            if figure.lane() == lane {
-                done.push((*figure, self.figure(figure, &pool)?));
+        for lane in lanes {
+            for (figure, is_taken) in self.chosen.iter().zip(&self.is_taken) {
+                if figure.lane() == *lane && !is_taken.swap(true, Ordering::Relaxed) {
+                    done.push((*figure, self.figure(figure, &pool)?));
+                }
             }
         }
         Ok(done)
     }
 
+    /// A figure from the cache, if it is there and may be taken.
+    fn cached(&self, figure: &Figure) -> Result<Option<Rendered>, Failure> {
+        // The key of the cache does not include a wake from elsewhere.
+        if self.context.anew || self.context.wake.is_some() {
+            return Ok(None);
+        }
+        Ok(cache::load(
+            figure.id,
+            &cache::folder(figure.id, self.context)?,
+        ))
+    }
+
     /// One figure, from the cache or made by the threads of the pool, and written.
     fn figure(&self, figure: &'static Figure, pool: &ThreadPool) -> Result<Rendered, Failure> {
-        self.bar.set_message(figure.id);
-        // The key of the cache knows nothing of a wake from elsewhere.
-        let is_other = self.context.wake.is_some();
-        let folder = cache::folder(figure.id, self.context)?;
-        let cached = if self.context.anew || is_other {
-            None
-        } else {
-            cache::load(figure.id, &folder)
-        };
+        let cached = self.cached(figure)?;
         let note = if cached.is_some() { " (cached)" } else { "" };
         let rendered = match cached {
             Some(rendered) => rendered,
             None => {
                 let rendered = make(figure, self.context, pool)?;
-                if !is_other {
+                if self.context.wake.is_none() {
+                    let folder = cache::folder(figure.id, self.context)?;
                     cache::store(figure.id, &folder, &rendered)?;
                 }
                 rendered
             }
         };
         rendered.files_in(self.out, figure.id)?.commit()?;
-        self.bar.inc(1);
-        self.bar
-            .println(format!("{}{note}: {}", figure.id, figure.title));
+        let finished = self.finished.fetch_add(1, Ordering::Relaxed) + 1;
+        say(&format!(
+            "[{finished:>2}/{}] {:>6}  {}{note}",
+            self.chosen.len(),
+            minutes(self.start.elapsed().as_secs_f64()),
+            figure.heading()
+        ))?;
         Ok(rendered)
     }
+}
+
+/// A time as minutes and seconds.
+fn minutes(time_s: f64) -> String {
+    let whole_s = time_s.round() as u64;
+    format!("{}:{:02}", whole_s / 60, whole_s % 60)
+}
+
+/// Forecast of the time of a run from the processor time of its figures with the profile quick.
+fn run_time(profile: Profile, quick_core_s: f64, cores: usize) -> String {
+    let wall_s = quick_core_s / cores as f64;
+    let quick = if wall_s < 60.0 {
+        "less than a minute".into()
+    } else {
+        format!("about {:.0} minutes", (wall_s / 60.0).ceil())
+    };
+    let time = profile.choose(quick.as_str(), "tens of minutes", "a day or more");
+    let plural = if cores == 1 { "" } else { "s" };
+    format!("{time} on {cores} core{plural}")
 }
 
 /// A figure made by the threads of a pool.
@@ -167,15 +241,6 @@ fn choose(only: &[u32]) -> Result<Vec<&'static Figure>, Failure> {
         .collect())
 }
 
-fn progress_bar(length: u64) -> ProgressBar {
-    let style =
-        ProgressStyle::with_template("[{bar:32}] {pos}/{len} {msg}  {elapsed} gone, {eta} left")
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(length).with_style(style);
-    bar.enable_steady_tick(std::time::Duration::from_millis(250));
-    bar
-}
-
 /// Writes the tables over all figures and the report, and says what the claims came to.
 fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> Outcome {
     let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
@@ -193,15 +258,17 @@ fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)], run_s: f6
         table.to_csv(&context.provenance_of_run())?,
     )?;
     write_atomic(&out.join("index.html"), report::html(context, done, run_s)?)?;
-    for claim in &claims {
-        println!("{:<8}{claim}", claim.kind().name());
-    }
-    println!(
-        "the chapter's {}\nthe program's own {}\nreport: {}",
-        report::counted(Kind::Chapter, &claims),
-        report::counted(Kind::Own, &claims),
-        out.join("index.html").display()
-    );
+    let report = out.join("index.html");
+    say(&format!("Report: {}", report.display()))?;
+    let of_chapter = report::Count::new(claims.iter().copied(), Kind::Chapter);
+    let of_program = report::Count::new(claims.iter().copied(), Kind::Own);
+    let hint = match (of_chapter.open, context.profile) {
+        (1.., Profile::Quick) => " (--profile standard decides)",
+        _ => "",
+    };
+    say(&format!("Statements of the chapter: {of_chapter}{hint}"))?;
+    say(&format!("Checks of the program itself: {of_program}"))?;
+    say(&format!("Run time: {}", report::duration(run_s)))?;
     let failed: Vec<&str> = claims
         .iter()
         .filter(|claim| claim.kind() != Kind::Chapter && claim.verdict == Verdict::Fail)
@@ -222,7 +289,7 @@ fn claims_table(claims: &[&Claim]) -> Table {
         .text("figure", column(claims, |c| &c.figure))
         .text("statement", column(claims, |c| &c.statement))
         .text("expected", column(claims, |c| &c.expected))
-        .text("measured", column(claims, |c| &c.measured))
+        .text("measured", column(claims, |c| c.all_measured()))
         .float("standard_error", column(claims, |c| c.standard_error))
         .text("verdict", column(claims, |c| c.verdict.name()))
         .text("kind", column(claims, |c| c.kind().name()))

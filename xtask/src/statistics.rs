@@ -166,7 +166,7 @@ impl Bar {
 }
 
 /// An error as it is told: two digits.
-pub(crate) fn two_digits(error: f64) -> String {
+fn two_digits(error: f64) -> String {
     format!("{error:.*}", decimals(error))
 }
 

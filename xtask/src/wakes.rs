@@ -35,8 +35,10 @@ pub(crate) const NAME: &str = "wake";
 const STORED: &str = "tests/reference/wake";
 const STORED_TABLES: [&str; 2] = ["case.toml", "wake.csv"];
 const STORED_TAU: [f64; 4] = [1.0, EARLY_TAU, 4.0, 5.0];
-/// The age that figures 10 to 14 and 25 call early; the claims on surfaces and short waves are decided before.
+/// The age that figures 10 to 14 and 25 call early.
 const EARLY_TAU: f64 = 2.5;
+/// Age at which the claims on surfaces and short waves are decided.
+const DECIDED_TAU: f64 = 2.0;
 /// Folders of the wakes that this process has made: two figures must not run the same one at the same time, nor twice.
 static MADE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
@@ -89,9 +91,13 @@ pub(crate) fn whole(context: &Context) -> Result<FinishedWake, Failure> {
         constant: None,
         order: None,
     };
+    // Four cells for the shortest wave along the flight that a claim is about.
+    if let CaseKind::Wake(flow) = &mut case.case {
+        flow.cells = [20, 80, 50];
+    }
     if let Some(output) = &mut case.wake {
-        output.end_tau = EARLY_TAU;
-        output.planes_tau = Some(vec![EARLY_TAU]);
+        output.end_tau = DECIDED_TAU;
+        output.planes_tau = Some(vec![DECIDED_TAU]);
     }
     run(&pictured(case), &context.stages, context.anew)
 }

@@ -14,6 +14,7 @@ mod report;
 
 use crate::cost::{Cost, machine};
 use crate::figures::context::{Rendered, column};
+use crate::profile::Profile;
 use crate::workspace::{provenance, root};
 use cases::{CASES, Case};
 use fixtures::failure::{Failure, Outcome};
@@ -22,8 +23,8 @@ pub(crate) use report::{picture, text};
 use std::path::PathBuf;
 use wakescope_sim::io::{Provenance, Table};
 
-/// What is measured: the groups and the rows of each, few and coarse ones if asked.
-type Rows = fn(bool) -> Result<Vec<Row>, Failure>;
+/// What is measured: the groups and the rows of each, few and coarse ones unless the profile is full.
+type Rows = fn(Profile) -> Result<Vec<Row>, Failure>;
 pub(crate) const GROUPS: [(&str, Rows); 5] = [
     ("optics", physics::optics),
     ("les", physics::les),
@@ -126,9 +127,9 @@ fn settings(
     Ok(rows)
 }
 
-/// The first three of the values if `quick`.
-fn few<T>(values: &[T], quick: bool) -> &[T] {
-    if quick {
+/// All values with the profile full, else the first three.
+fn few<T>(values: &[T], profile: Profile) -> &[T] {
+    if profile != Profile::Full {
         &values[..values.len().min(3)]
     } else {
         values
@@ -136,7 +137,7 @@ fn few<T>(values: &[T], quick: bool) -> &[T] {
 }
 
 /// The rows of a group or of all, on one thread, with those of other programs, case by case.
-pub(crate) fn measure(wanted: Option<&str>, quick: bool) -> Result<Vec<Row>, Failure> {
+pub(crate) fn measure(wanted: Option<&str>, profile: Profile) -> Result<Vec<Row>, Failure> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut others = peers::rows()?;
     let mut all = Vec::new();
@@ -144,7 +145,7 @@ pub(crate) fn measure(wanted: Option<&str>, quick: bool) -> Result<Vec<Row>, Fai
         if wanted.is_some_and(|wanted| wanted != name) {
             continue;
         }
-        let mut rows = pool.install(|| measure(quick))?;
+        let mut rows = pool.install(|| measure(profile))?;
         let cases: Vec<String> = rows.iter().map(|row| row.case.clone()).collect();
         rows.extend(others.extract_if(.., |row| cases.contains(&row.case)));
         // In the order in which they were measured, those of other programs after this program's.
@@ -235,7 +236,8 @@ fn print(rows: &[Row]) {
 /// # Errors
 /// Fails if a crate refuses a setting or the output cannot be written.
 pub(crate) fn run(group: Option<&str>, out: Option<PathBuf>, quick: bool) -> Outcome {
-    let rows = measure(group, quick)?;
+    let profile = if quick { Profile::Quick } else { Profile::Full };
+    let rows = measure(group, profile)?;
     print(&rows);
     let origin = provenance_of_run(quick);
     let folder = out.unwrap_or_else(|| root().join("target/work-precision"));

@@ -8,7 +8,7 @@ use wakescope_sim::io::{FileGroup, Provenance};
 // What figures are made of.
 pub(super) use crate::claim::{Claim, Part};
 pub(super) use crate::profile::Profile;
-pub(super) use crate::statistics::{BATCHES, Bar, Estimate, Verdict};
+pub(super) use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE, Verdict};
 pub(super) use fixtures::failure::Failure;
 pub(super) use ndarray::Array2;
 pub(super) use wakescope_les::analysis::decay::value_at;
@@ -73,6 +73,43 @@ impl Context {
     }
 }
 
+/// The error of correlogram accumulation relative to that of one periodogram accumulation on the same signals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Comparison {
+    /// Duration of the pulse, in print.
+    pub(crate) pulse: String,
+    /// The periodogram accumulation.
+    pub(crate) against: String,
+    pub(crate) inside: Difference,
+    pub(crate) outside: Difference,
+}
+
+/// A relative difference of two errors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Difference {
+    /// The value with its 95 % interval, in print.
+    pub(crate) interval: String,
+    /// Whether it is below zero.
+    pub(crate) verdict: Verdict,
+}
+
+impl Difference {
+    /// From a fraction.
+    pub(super) fn new(fraction: Estimate) -> Self {
+        let percent = fraction.times(100.0);
+        let half = percent.half_width();
+        Self {
+            interval: format!(
+                "{:+.0} % ({:+.0} to {:+.0})",
+                percent.value,
+                percent.value - half,
+                percent.value + half
+            ),
+            verdict: Bar::Less(NO_DIFFERENCE).verdict(&fraction),
+        }
+    }
+}
+
 /// What a figure gives.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Rendered {
@@ -85,8 +122,8 @@ pub(crate) struct Rendered {
     pub(crate) values: Vec<String>,
     /// Short notes beside the name, such as what is not the real thing.
     pub(crate) marks: Vec<String>,
-    /// What it comes to, for the head of the report; mostly nothing.
-    pub(crate) words: String,
+    /// Errors of correlogram and periodogram accumulation side by side, for the head of the report; mostly nothing.
+    pub(crate) comparison: Vec<Comparison>,
     /// Claims measured on the data of the run.
     pub(crate) claims: Vec<Claim>,
     /// Wall-clock time and processor time that it took, s.

@@ -69,7 +69,7 @@ fn plot(rows: &[[f64; 3]], top_m_s: f64) -> CurvePlot {
         potential.push((y, if is_drawn { w_potential } else { f64::NAN }));
     }
     let x = Axis::linear("y / b₀");
-    let y = Axis::linear("w / (Γ₀ / 4π r_c)").between(-1.6, 1.6);
+    let y = Axis::linear("w / (Γ₀ / 4π r_{c})").between(-1.6, 1.6);
     let algebraic = Series::new("algebraic profile (3)", Style::Line, algebraic);
     let potential = Series::new("potential vortices", Style::DashDot, potential);
     CurvePlot::new("Vertical velocity through the cores", x, y)

@@ -43,7 +43,7 @@ impl Curve {
 const FEWER_IF_WEAK: usize = 4;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let realisations = context.profile.choose(48, 400, 400);
+    let realisations = context.profile.choose(32, 400, 400);
     let realisations_weak = realisations / FEWER_IF_WEAK;
     // A range in the middle and at the end of each layer of the chapter's path.
     let range_m: Vec<f64> = (1..=20).map(|i| 150.0 * f64::from(i)).collect();

@@ -33,11 +33,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut out = Rendered::new(&table, &figure, &origin)?;
     let animation = apng(&wake.frames()?, FRAME_S, &origin)?;
     out.files.push(("apng".into(), animation));
-    out.values = vec![
-        format!("{:?}", wake.fields_tau),
-        wake.words(),
-        REPEATS.to_string(),
-    ];
+    let ages: Vec<String> = wake.fields_tau.iter().map(f64::to_string).collect();
+    out.values = vec![ages.join(", "), wake.words(), REPEATS.to_string()];
     out.claims = vec![secondary(&wake)?, short_waves(&wake)?];
     Ok(out)
 }

@@ -111,21 +111,24 @@ fn decay_claims(wake: &FinishedWake) -> Result<Vec<Claim>, Failure> {
     let claims = [
         Claim::exact(
             "F7a",
-            format!("{lost:.3} at the onset, {onset_words} ({noise})"),
+            format!("{lost:.3} at the onset, {onset_words}"),
             lost < 0.1,
-        ),
+        )
+        .beside(&noise),
         Claim::exact(
             "F7b",
             format!(
-                "{onset_words} by three times the early loss; early and steepest line meet {meets} ({noise}; {BY_NOISE})"
+                "{onset_words} by three times the early loss; early and steepest line meet {meets}"
             ),
             onset.is_some_and(|tau| (tau - 2.8).abs() <= 0.3),
-        ),
+        )
+        .beside(&format!("{noise}; {BY_NOISE}")),
         Claim::exact(
             "F7c",
-            format!("{left:.3} at tau = 5 ({noise}; {BY_NOISE})"),
+            format!("{left:.3} at tau = 5"),
             (left - 0.6).abs() <= 0.07,
-        ),
+        )
+        .beside(&format!("{noise}; {BY_NOISE}")),
     ];
     let is_of_chapter =
         wake.flow.reynolds >= CHAPTER_REYNOLDS && wake.flow.core_radius <= CHAPTER_CORE_B0;

@@ -63,7 +63,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         for (field, title) in [("v_exact", "exact"), ("radial_velocity", "estimated")] {
             let plot = MapPlot::new(map, 0, field)?
                 .titled(&format!("{title}, τ = {tau}"))
-                .labelled("v_R [m/s]");
+                .labelled("v_{R} [m/s]");
             panels.push(plot.coloured(colours));
         }
     }

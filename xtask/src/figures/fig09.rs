@@ -91,7 +91,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             points.push((range_m, level.windows as f64));
             levels.push(level);
         }
-        series.push(Series::new(&format!("rho = {radius_m} m"), style, points));
+        series.push(Series::new(&format!("ρ = {radius_m} m"), style, points));
     }
     let table = Table::new()
         .float("rho_m", column(&levels, |l| l.radius_m))

@@ -23,7 +23,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             panels.push(
                 MapPlot::new(&map, 0, "v_exact")?
                     .titled(&format!("Radial velocity, {}", sight.mark))
-                    .labelled("v_R [m/s]"),
+                    .labelled("v_{R} [m/s]"),
             );
         }
         let title = format!("Standard deviation of the estimate, {name} signal-to-noise ratio");

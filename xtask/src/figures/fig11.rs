@@ -48,12 +48,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             panels.push(
                 exact
                     .titled(&format!("Radial velocity, {}", sight.mark))
-                    .labelled("v_R [m/s]"),
+                    .labelled("v_{R} [m/s]"),
             );
         }
         panels.push(
             mean.titled(&format!("Mean estimate, {name} signal-to-noise ratio"))
-                .labelled("v_R [m/s]"),
+                .labelled("v_{R} [m/s]"),
         );
         let error = MapPlot::new(&map, 0, "rms")?;
         panels.push(

@@ -5,7 +5,6 @@ use super::study::{
     EARLY_TAU, INSIDE_M, METHODS, NamedZone, OUTSIDE_M, REFERENCES, Sight, Study, Zone, batches,
     early_scene, with_method, with_turbulence,
 };
-use crate::statistics::NO_DIFFERENCE;
 
 const ENERGIES_J: [f64; 4] = [50e-6, 150e-6, 300e-6, 600e-6];
 
@@ -84,7 +83,7 @@ fn curve(study: &Study, reference: &'static str) -> Curve {
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let sight = Sight::of(context, EARLY_TAU)?;
     // Claims are judged at the chapter's reference.
-    let scans = context.profile.choose([8, 48], [24, 96], [104, 104]);
+    let scans = context.profile.choose([8, 16], [24, 96], [104, 104]);
     let (references, scenes): (Vec<_>, Vec<_>) = self::scenes(context, scans).into_iter().unzip();
     let studies = Study::runs(context, &sight, scenes)?;
     let mut all = Vec::new();
@@ -192,7 +191,7 @@ fn levels(curves: &[Curve], zone: fn(&Curve) -> &Zone) -> String {
             zone(c).average.bias_m_s
         )
     });
-    all.collect::<Vec<_>>().join(", ")
+    all.collect::<Vec<_>>().join("; ")
 }
 
 fn outside_claim(curves: &[Curve], study: &Study) -> Claim {

@@ -16,36 +16,23 @@ pub(super) fn make_13(context: &Context) -> Result<Rendered, Failure> {
     // Rare estimates anywhere in the band make most of the scatter, so scans count more than neighbouring gates, which see the same signals.
     // At 200 ns the difference from weighted PA is next to nothing, which takes many to tell.
     let scans = context.profile.choose(
-        [[8; 2], [1280, 160]],
+        [[8; 2], [72, 32]],
         [[32; 2], [1280, 320]],
         [[96; 2], [1600, 400]],
     );
-    let (mut out, chapter) = compare(context, 1, scans, |mut scene| {
-        scene.estimator.gate_step_samples = context.profile.choose(10, 5, 5);
-        scene
-    })?;
+    let (mut out, chapter) = compare(context, 1, scans, |scene| scene)?;
     let parts = profiles::parts(&chapter, " m/s", |p, without| {
         p.excess_m_s(&p.inside, without)
     });
-    let whole = profiles::parts(&chapter, " m/s", |p, without| p.inside.rms_m_s(without));
-    out.words = format!(
-        "Does correlogram accumulation err less than periodogram accumulation inside the vortices, as the chapter has it, at its ratio? As it is: \
-         {}. Less what each errs outside, as the chapter draws it: {} (figure 13).",
-        profiles::told(&whole),
-        profiles::told(&parts)
-    );
-    out.claims = vec![
-        Claim::judged("F13", &parts)
-            .beside(&format!("with the evolution: {}", profiles::told(&whole))),
-    ];
+    out.comparison = profiles::comparison(&chapter);
+    out.claims = vec![Claim::judged("F13", &parts)];
     Ok(out)
 }
 
 pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
-    let scans =
-        context
-            .profile
-            .choose([[8; 2], [168; 2]], [[32; 2], [192; 2]], [[96; 2], [400; 2]]);
+    let scans = context
+        .profile
+        .choose([[8; 2], [32; 2]], [[32; 2], [192; 2]], [[96; 2], [400; 2]]);
     let (mut out, chapter) = compare(context, DURATIONS_S.len(), scans, |scene| {
         with_turbulence(context, scene, 1e-15)
     })?;
@@ -55,10 +42,6 @@ pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
     let widths = profiles::parts(&chapter, " m", |p, without| {
         profiles::width_m(&p.across_m_s(without))
     });
-    out.words = format!(
-        "Is its profile across a core narrower, too? {} (figure 14).",
-        profiles::told(&widths)
-    );
     out.claims = vec![
         Claim::judged("F14a", &peaks),
         Claim::judged("F14b", &widths),
@@ -84,6 +67,7 @@ fn compare(
                 let mut scene = with_method(near_scene(scans), method);
                 scene.detector.snr = snr;
                 scene.pulse.shape = PulseShape::gaussian(duration_s);
+                scene.estimator.gate_step_samples = context.profile.choose(10, 5, 5);
                 scenes.push(change(scene));
             }
         }
@@ -137,7 +121,7 @@ fn plots(durations_in_panel: usize, all: &[Profiles]) -> Vec<CurvePlot> {
                 first.name, first.snr_db
             )
         };
-        plots.push(profiles::plot(&title, shown));
+        plots.push(profiles::plot(&title.replace(" -", " −"), shown));
     }
     plots
 }

@@ -9,7 +9,7 @@ const PART: &str = "; a few settings, the whole is `cargo xtask work-precision`"
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let is_part = context.profile != Profile::Full;
-    let rows = measure(None, is_part)?;
+    let rows = measure(None, context.profile)?;
     let origin = context.provenance_of_formula(&format!(
         "profile = \"{}\"\nthreads = 1\n",
         context.profile.name()

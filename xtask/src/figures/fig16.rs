@@ -9,7 +9,7 @@ const APART: f64 = 0.01;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let rows = rows(|_, case| !(case.long && context.profile != Profile::Full));
-    let panels = maps::measure()?;
+    let panels = maps::measure(context.profile)?;
     let origin = context.provenance_of_run();
     let mut out = Rendered::new(&stability::table(&rows), &maps::picture(&panels), &origin)?;
     out.add("maps.csv", &maps::table(&panels), &origin)?;

@@ -10,8 +10,16 @@ use wakescope_estimate::retrieval::VortexResult;
 use wakescope_sim::retrieve::{Method, RetrievalRow, name};
 use wakescope_sim::scene::{Method as Estimator, Retrieval, VortexPair, Weighting};
 
-/// Ages of the simulated wake; the pair has none.
-const AGES: [Option<f64>; 4] = [None, Some(1.0), Some(2.5), Some(4.0)];
+/// Age of the simulated wake, of which the pair has none, and the claim on the flow.
+type Aged = (Option<f64>, &'static str);
+const AGES: [Aged; 4] = [
+    (None, "F17g"),
+    (Some(1.0), "F17h"),
+    (Some(2.5), "F17i"),
+    (Some(4.0), "F17j"),
+];
+/// Of these the profile quick has every second one.
+const QUICK_STEP: usize = 2;
 /// The method that is judged: what `[retrieval]` does unless it is told otherwise.
 const JUDGED: &str = "fit";
 const METHODS: [Method; 4] = [Method::Fit, Method::Rv, Method::Envelope, Method::Signals];
@@ -36,6 +44,7 @@ const SNR_DB: f64 = 10.0;
 /// All methods on one flow.
 pub(super) struct OfFlow {
     tau: Option<f64>,
+    claim: &'static str,
     rows: Vec<(&'static str, RetrievalRow)>,
 }
 
@@ -90,11 +99,12 @@ fn error_percent(row: &RetrievalRow) -> Option<f64> {
 pub(super) fn all(context: &Context) -> Result<Vec<OfFlow>, Failure> {
     let wake = wakes::of(context)?;
     AGES.par_iter()
-        .map(|tau| of_flow(context, *tau, &wake))
+        .step_by(context.profile.choose(QUICK_STEP, 1, 1))
+        .map(|aged| of_flow(context, *aged, &wake))
         .collect()
 }
 
-fn of_flow(context: &Context, tau: Option<f64>, wake: &FinishedWake) -> Result<OfFlow, Failure> {
+fn of_flow(context: &Context, (tau, claim): Aged, wake: &FinishedWake) -> Result<OfFlow, Failure> {
     let sight = match tau {
         Some(tau) => Sight::of_wake(wake, tau)?,
         None => Sight::of_pair(VortexPair::default()),
@@ -108,7 +118,7 @@ fn of_flow(context: &Context, tau: Option<f64>, wake: &FinishedWake) -> Result<O
         scene.scan.elevation_step_rad = 1.25e-3;
         scene.estimator.gate_step_samples = 5;
     }
-    scene.scan.realisations = context.profile.choose(3, 12, 32);
+    scene.scan.realisations = context.profile.choose(2, 12, 32);
     let retrieval = Retrieval {
         methods: methods(context.profile).to_vec(),
         ..Retrieval::default()
@@ -126,7 +136,7 @@ fn of_flow(context: &Context, tau: Option<f64>, wake: &FinishedWake) -> Result<O
     for row in retrieved(&scene, of_means, &sight.folder)? {
         rows.push((OF_MEANS, row));
     }
-    Ok(OfFlow { tau, rows })
+    Ok(OfFlow { tau, claim, rows })
 }
 
 /// The scan, of which quick has all.
@@ -227,15 +237,11 @@ pub(super) fn picture(flows: &[OfFlow]) -> CurvePlot {
 }
 
 pub(super) fn claims(flows: &[OfFlow]) -> Vec<Claim> {
-    let ids = ["F17g", "F17h", "F17i", "F17j"];
-    ids.into_iter()
-        .zip(flows)
-        .map(|(id, flow)| claim(id, flow))
-        .collect()
+    flows.iter().map(claim).collect()
 }
 
 /// The bias of the method that is judged; all are reported.
-fn claim(id: &str, flow: &OfFlow) -> Claim {
+fn claim(flow: &OfFlow) -> Claim {
     let judged = flow.errors(JUDGED);
     let mut others = Vec::new();
     for name in names() {
@@ -251,6 +257,6 @@ fn claim(id: &str, flow: &OfFlow) -> Claim {
         ));
     }
     let words = format!("{} failed; {}", judged.missing, others.join("; "));
-    Claim::judged_alone(id, judged.bias, " %", Bar::Between(-5.0, 5.0))
+    Claim::judged_alone(flow.claim, judged.bias, " %", Bar::Between(-5.0, 5.0))
         .of_fits(judged.missing, &words)
 }

@@ -3,8 +3,6 @@
 use super::context::*;
 use super::profiles::Profiles;
 use super::study::{EARLY_TAU, METHODS, Sight, Study, Zone, batches, near_scene, with_method};
-use crate::statistics::NO_DIFFERENCE;
-use crate::wakes;
 use wakescope_sim::scene::{NoiseModel, Refinement, VortexPair};
 
 /// Ratio at which cores and bins are compared, near that of the chapter, and the one at which noise is, near the physical one, dB.
@@ -18,8 +16,6 @@ const CORES: [f64; 4] = [0.05, 0.075, 0.1, 0.15];
 #[derive(Clone, Copy, PartialEq)]
 enum Seen {
     Wake,
-    /// A wake with twice the core, on a coarse mesh.
-    Coarse,
     /// The analytic pair with a core radius in spacings.
     Pair(f64),
 }
@@ -69,39 +65,38 @@ fn at(setting: Case, snr_db: f64) -> Case {
 }
 
 fn cases(context: &Context) -> Vec<Case> {
-    let is_quick = context.profile == Profile::Quick;
     let levels_db = context.profile.choose(
-        vec![WEAK_DB, -5.0, CHAPTER_DB, 10.0, STRONG_DB],
+        vec![WEAK_DB, CHAPTER_DB, 10.0, STRONG_DB],
         vec![WEAK_DB, -5.0, CHAPTER_DB, 5.0, 10.0, 15.0, STRONG_DB],
         vec![
             WEAK_DB, -7.5, -5.0, -2.5, CHAPTER_DB, 5.0, 10.0, 15.0, STRONG_DB,
         ],
     );
-    let few_levels_db = [WEAK_DB, CHAPTER_DB];
+    let bins_db: &[f64] = context.profile.choose(
+        &[CHAPTER_DB],
+        &[CHAPTER_DB, STRONG_DB],
+        &[CHAPTER_DB, STRONG_DB],
+    );
     let mut cases = Vec::new();
-    for snr_db in [CHAPTER_DB, STRONG_DB] {
+    for &snr_db in bins_db {
         cases.push(Case {
             bins: true,
             ..at(WAKE, snr_db)
         });
     }
     for setting in SETTINGS {
-        // Eight pulses need eight times the run time, and white noise matters to weak signals: quick has the ratios of claims.
-        let is_short = is_quick && (setting.pulses > 1 || setting.noise == NoiseModel::White);
-        let levels_db: &[f64] = if is_short { &few_levels_db } else { &levels_db };
+        // Eight pulses need eight times the run time, and white noise matters to weak signals.
+        let levels_db: &[f64] = match (context.profile, setting.pulses, setting.noise) {
+            (Profile::Quick, 8, _) => &[WEAK_DB],
+            (Profile::Quick, _, NoiseModel::White) => &[WEAK_DB, CHAPTER_DB],
+            _ => &levels_db,
+        };
         for &snr_db in levels_db {
             cases.push(at(setting, snr_db));
         }
     }
     for &core in &CORES[1..] {
         cases.push(pair(core));
-    }
-    // The flow that quick has whole is another one.
-    if is_quick && context.wake.is_none() && !context.analytic {
-        cases.push(Case {
-            seen: Seen::Coarse,
-            ..WAKE
-        });
     }
     cases
 }
@@ -134,7 +129,6 @@ impl Case {
     fn name(&self) -> String {
         let flow = match self.seen {
             Seen::Wake => "wake".into(),
-            Seen::Coarse => "coarse wake".into(),
             Seen::Pair(core) => format!("pair, core {core} b₀"),
         };
         let noise = if self.noise == NoiseModel::White {
@@ -191,7 +185,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     for cases in cases(context).chunk_by(|a, b| a.seen == b.seen) {
         let sight = match cases[0].seen {
             Seen::Wake => &sight,
-            Seen::Coarse => &Sight::of_wake(&wakes::whole(context)?, EARLY_TAU)?,
             Seen::Pair(core) => &Sight::of_pair(VortexPair {
                 core_radius_m: core * VortexPair::default().spacing_m,
                 ..VortexPair::default()
@@ -212,7 +205,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     out.add("batches.csv", &batches(&zones), &origin)?;
     out.values = vec![scans.to_string(), sight.words];
     out.marks = vec![sight.mark, "analytic pair".into()];
-    out.words = words(&all)?;
     out.claims = claims(&all)?;
     Ok(out)
 }
@@ -313,7 +305,7 @@ fn panel(
     number: fn(&Case) -> f64,
     curves: &[Curve],
 ) -> CurvePlot {
-    let y = Axis::linear("(CA - PA)/PA").between(-0.8, 1.6);
+    let y = Axis::linear("(CA − PA)/PA").between(-0.8, 1.6);
     let mut plot = CurvePlot::new(title, Axis::linear(label), y);
     for (colour, (name, of)) in curves.iter().enumerate() {
         for (pa, style) in [(0, Style::LineMarkers), (1, Style::Dash)] {
@@ -338,51 +330,6 @@ fn find(all: &[Measured], case: Case) -> Result<&Measured, Failure> {
     all.iter()
         .find(|m| m.case == case)
         .ok_or_else(|| Failure::new(format!("figure 25 lacks {}", case.name())))
-}
-
-/// How much less CA errs than unweighted PA inside in a case, in per cent.
-fn per_cent(all: &[Measured], case: Case) -> Result<String, Failure> {
-    let share = find(all, case)?.share(0, inside);
-    Ok(format!("{} %", share.times(100.0).words()))
-}
-
-/// Where it holds and where not, in a sentence.
-fn words(all: &[Measured]) -> Result<String, Failure> {
-    let mut holds = Vec::new();
-    for m in all {
-        if at(m.case, CHAPTER_DB) != WAKE {
-            continue;
-        }
-        let share = m.share(0, inside);
-        let verdict = match Bar::Less(NO_DIFFERENCE).verdict(&share) {
-            Verdict::Pass => "less",
-            Verdict::Fail => "not less",
-            Verdict::Open => "open",
-        };
-        let share = per_cent(all, m.case)?;
-        holds.push(format!("{} dB {verdict} ({share})", m.case.snr_db));
-    }
-    let coarse = Case {
-        seen: Seen::Coarse,
-        ..WAKE
-    };
-    let coarse = per_cent(all, coarse).map_or(String::new(), |share| {
-        format!(", on a coarse wake with twice the core {share}")
-    });
-    let white = Case {
-        noise: NoiseModel::White,
-        ..at(WAKE, WEAK_DB)
-    };
-    Ok(format!(
-        "Where that reaches (figure 25, error of CA less that of unweighted PA over the latter, inside): on the wake {}; at {WEAK_DB} dB in white noise \
-         {}; inside a core of {} b₀ at {CHAPTER_DB} dB {}, of {} b₀ {}{coarse}.",
-        holds.join(", "),
-        per_cent(all, white)?,
-        CORES[0],
-        per_cent(all, PAIR)?,
-        CORES[3],
-        per_cent(all, pair(CORES[3]))?
-    ))
 }
 
 /// CA against PA in a case, and where the difference must lie.

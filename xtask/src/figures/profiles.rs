@@ -6,7 +6,6 @@
 
 use super::context::*;
 use super::study::{INSIDE_M, METHODS, NamedZone, OUTSIDE_M, Study, Zone};
-use crate::statistics::NO_DIFFERENCE;
 use wakescope_sim::measure::cell_average::CellAverage;
 
 /// Lines of sight count that pass a centre within this distance, m.
@@ -216,25 +215,26 @@ pub(super) fn parts(
     parts
 }
 
-/// In which readings a difference is below zero, in which it is not, and which are open, with their numbers.
-pub(super) fn told(parts: &[Part]) -> String {
-    let headings = [
-        (Verdict::Pass, "yes"),
-        (Verdict::Fail, "no"),
-        (Verdict::Open, "open"),
-    ];
-    let mut sentences = Vec::new();
-    for (verdict, heading) in headings {
-        let readings: Vec<String> = parts
-            .iter()
-            .filter(|part| part.bar.verdict(&part.found) == verdict)
-            .map(Part::words)
-            .collect();
-        if !readings.is_empty() {
-            sentences.push(format!("{heading}: {}", readings.join("; ")));
+/// The error of CA relative to that of each PA, case by case, inside and outside.
+pub(super) fn comparison(all: &[Profiles]) -> Vec<Comparison> {
+    let mut comparison = Vec::new();
+    for case in all.chunks(METHODS.len()) {
+        let [pas @ .., ca] = case else {
+            continue;
+        };
+        for pa in pas {
+            comparison.push(Comparison {
+                pulse: format!("{:.0} ns", 1e9 * pa.pulse_s),
+                against: match pa.method {
+                    "PA" => "unweighted".into(),
+                    _ => "Gaussian weighting".into(),
+                },
+                inside: Difference::new(ca.inside.over(&pa.inside)),
+                outside: Difference::new(ca.outside.over(&pa.outside)),
+            });
         }
     }
-    sentences.join(". ")
+    comparison
 }
 
 /// All profiles as one table.

@@ -1,14 +1,19 @@
-//! The report of a run as one HTML page that opens from disk: findings, figures, claims, run times; pictures inside, no script, nothing
-//! fetched.
+//! The report of a run as one HTML page that opens from disk: figures, the comparison of the two accumulations, the
+//! chapter's statements, the program's own checks, run times; pictures inside, no script, nothing fetched.
 //!
 //! Check: every text is escaped, the page names nothing outside itself, verdicts are marked by colour and by word.
+
+mod elements;
 
 use crate::claim::{Claim, Kind};
 use crate::cost::machine;
 use crate::figures::context::{Context, Rendered};
 use crate::figures::{Figure, filled};
-use crate::statistics::{Verdict, two_digits};
+use crate::profile::Profile;
+use crate::statistics::Verdict;
+use elements::{Picture, badge, folded, table, table_of_csv, thumbnail_of_csv, typeset};
 use fixtures::failure::Failure;
+use std::fmt;
 use wakescope_sim::plot::escape;
 
 /// What run times are of: figures have no stages of their own.
@@ -17,98 +22,352 @@ pub(super) const STAGE: &str = "total";
 /// Figures with what they gave.
 type Done<'a> = [(&'a Figure, Rendered)];
 
-/// What stands before the figures: a heading, whether of the chapter's claims, and how they came out.
-const FINDINGS: [(&str, bool, Verdict); 4] = [
-    (
-        "What the chapter says and this run does not find",
-        true,
-        Verdict::Fail,
-    ),
-    (
-        "What the chapter says and this run does not decide",
-        true,
-        Verdict::Open,
-    ),
-    ("The program's own claims that fail", false, Verdict::Fail),
-    (
-        "The program's own claims that this run does not decide",
-        false,
-        Verdict::Open,
-    ),
-];
-
 /// The page.
 ///
 /// # Errors
 /// A row with another number of cells than its header, a picture that is not an `<svg>` element, two figures of one id.
 pub(super) fn html(context: &Context, done: &Done<'_>, run_s: f64) -> Result<String, Failure> {
-    let parts = [
+    let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
+    let sections = [
         include_str!("report.css").into(),
-        escape(&found(context, done, run_s)),
-        findings(done),
-        links(done),
+        numbers(done.len(), &claims, run_s),
+        thumbnails(done)?,
+        comparison(done)?,
+        statements(&claims, context.profile)?,
         figures(done)?,
-        claims(done)?,
+        checks(&claims)?,
         timings(done)?,
         origin(context),
     ];
-    filled(include_str!("report.html"), &parts)
+    filled(include_str!("report.html"), &sections)
         .ok_or_else(|| Failure::new("the page lacks parts".into()))
 }
 
-/// The claims that do not hold and those that are open, list by list.
-fn findings(done: &Done<'_>) -> String {
-    let mut findings = String::new();
-    let mut class = "finding first";
-    for (heading, of_chapter, verdict) in FINDINGS {
-        let mut list = String::new();
-        for (_, rendered) in done {
-            for claim in &rendered.claims {
-                let is_of_chapter = claim.kind() == Kind::Chapter;
-                if claim.verdict == verdict && is_of_chapter == of_chapter {
-                    list += &finding(class, claim, rendered.took_s[1]);
-                }
+/// How claims of a kind came out.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Count {
+    pub(super) holds: usize,
+    pub(super) fails: usize,
+    pub(super) open: usize,
+}
+
+impl Count {
+    pub(super) fn new<'c>(claims: impl IntoIterator<Item = &'c Claim>, kind: Kind) -> Self {
+        let mut count = Self::default();
+        for claim in claims {
+            if claim.kind() != kind {
+                continue;
+            }
+            match claim.verdict {
+                Verdict::Pass => count.holds += 1,
+                Verdict::Fail => count.fails += 1,
+                Verdict::Open => count.open += 1,
             }
         }
-        if !list.is_empty() {
-            findings += &format!("<h2>{heading}</h2>\n{list}");
-            class = "finding";
-        }
+        count
     }
-    findings
-}
 
-/// Links to all figures and tables.
-fn links(done: &Done<'_>) -> String {
-    let mut links = String::new();
-    for (figure, _) in done {
-        links += &link(figure.id, &figure.heading());
+    pub(super) fn all(self) -> usize {
+        self.holds + self.fails + self.open
     }
-    links + &link("claims", "All claims") + &link("timings", "Run times")
 }
 
-fn link(id: &str, name: &str) -> String {
-    format!("<li><a href=\"#{id}\">{}</a></li>\n", escape(name))
+impl fmt::Display for Count {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { holds, fails, open } = self;
+        write!(
+            f,
+            "{holds} of {} hold, {fails} fail, {open} open",
+            self.all()
+        )
+    }
 }
 
-/// All figures.
+/// A time in minutes and seconds.
+pub(super) fn duration(time_s: f64) -> String {
+    let whole_s = time_s.round() as u64;
+    match (whole_s / 3600, whole_s / 60 % 60, whole_s % 60) {
+        (0, 0, seconds) => format!("{seconds} s"),
+        (0, minutes, seconds) => format!("{minutes} min {seconds} s"),
+        (hours, minutes, _) => format!("{hours} h {minutes} min"),
+    }
+}
+
+/// The numbers at the head of the page.
+fn numbers(figures: usize, claims: &[&Claim], run_s: f64) -> String {
+    let of_chapter = Count::new(claims.iter().copied(), Kind::Chapter);
+    let numbers = [
+        ("", figures.to_string(), "figures and tables drawn".into()),
+        (
+            "pass",
+            of_chapter.holds.to_string(),
+            format!("of {} statements reproduced", of_chapter.all()),
+        ),
+        (
+            "fail",
+            of_chapter.fails.to_string(),
+            format!("not reproduced; {} open", of_chapter.open),
+        ),
+        ("", duration(run_s), "run time".into()),
+    ];
+    let mut list = String::new();
+    for (class, number, name) in numbers {
+        list += &format!("<li class=\"{class}\"><b>{number}</b> <span>{name}</span></li>\n");
+    }
+    list
+}
+
+/// What the picture of a figure, or the rows of a table, are made of.
+enum Shown<'r> {
+    Picture(Picture<'r>),
+    Rows(std::borrow::Cow<'r, str>),
+}
+
+/// The picture of a figure; its table where it has none.
+fn shown<'r>(figure: &Figure, rendered: &'r Rendered) -> Result<Shown<'r>, Failure> {
+    match rendered.file("svg") {
+        Some(svg) => Ok(Shown::Picture(Picture::new(
+            figure.id,
+            std::str::from_utf8(svg)?,
+        )?)),
+        None => Ok(Shown::Rows(String::from_utf8_lossy(
+            rendered.file("csv").unwrap_or_default(),
+        ))),
+    }
+}
+
+/// A small picture of each figure, which leads to it.
+fn thumbnails(done: &Done<'_>) -> Result<String, Failure> {
+    let mut list = String::new();
+    for (figure, rendered) in done {
+        let small = match shown(figure, rendered)? {
+            Shown::Picture(picture) => picture.thumbnail(),
+            Shown::Rows(csv) => thumbnail_of_csv(&csv),
+        };
+        let id = figure.id;
+        let number = escape(&figure.numbered());
+        let title = typeset(figure.title);
+        list += &format!(
+            "<li><a href=\"#{id}\">{small}<span><b>{number}</b> {title}</span></a></li>\n"
+        );
+    }
+    Ok(list)
+}
+
+/// All figures with their captions.
 ///
 /// # Errors
-/// Fails if two have one id, or one is not as [`entry`] needs it.
+/// Fails if two have one id, or a picture is not as [`Picture::new`] needs it.
 fn figures(done: &Done<'_>) -> Result<String, Failure> {
     let mut figures = String::new();
     let mut ids = Vec::new();
     for (figure, rendered) in done {
-        if ids.contains(&figure.id) {
+        let id = figure.id;
+        if ids.contains(&id) {
             return Err(Failure::new(format!(
-                "two figures of the report are called '{}'",
-                figure.id
+                "two figures of the report are called '{id}'"
             )));
         }
-        ids.push(figure.id);
-        figures += &entry(figure, rendered)?;
+        ids.push(id);
+        let mut marks = String::new();
+        for mark in &rendered.marks {
+            marks += &format!(" <span class=\"mark\">{}</span>", escape(mark));
+        }
+        let heading = figure.heading();
+        let content = match shown(figure, rendered)? {
+            Shown::Picture(picture) => picture.full(&heading),
+            Shown::Rows(csv) => table_of_csv(id, &csv)?,
+        };
+        figures += &format!(
+            "<figure id=\"{id}\">\n<h3>{}{marks}</h3>\n{content}<figcaption>{}</figcaption>\n</figure>\n",
+            typeset(&heading),
+            typeset(&rendered.caption)
+        );
     }
     Ok(figures)
+}
+
+/// What the comparison of the accumulations compares.
+const COMPARED: &str = "Relative difference of the root mean square errors on the same signals at the chapter's \
+    signal-to-noise ratio, with 95 % intervals (a lead that is surely below 3 % counts as none); the chapter's statement \
+    on figure 13 subtracts the error outside first.";
+
+/// Whether correlogram accumulation has the smaller error, case by case; nothing where no figure compares it.
+fn comparison(done: &Done<'_>) -> Result<String, Failure> {
+    let Some((figure, rendered)) = done.iter().find(|(_, r)| !r.comparison.is_empty()) else {
+        return Ok(String::new());
+    };
+    let mut rows = Vec::new();
+    for case in &rendered.comparison {
+        let mut row = vec![typeset(&case.pulse), typeset(&case.against)];
+        for region in [&case.inside, &case.outside] {
+            let class = region.verdict.name();
+            let word = match region.verdict {
+                Verdict::Pass => "yes",
+                Verdict::Fail => "no",
+                Verdict::Open => "open",
+            };
+            row.push(format!(
+                "<span class=\"value\">{}</span> {}",
+                typeset(&region.interval),
+                badge(class, word)
+            ));
+        }
+        rows.push(row);
+    }
+    let header = ["Pulse", "Against", "Inside the vortices", "Outside"];
+    Ok(format!(
+        "<h2 id=\"accumulation\">Does correlogram accumulation win?</h2>\n{}<p>{} <a href=\"#{}\">{}</a></p>\n",
+        table("comparison", &header, &rows)?,
+        COMPARED,
+        figure.id,
+        figure.numbered()
+    ))
+}
+
+/// The word for a verdict on a statement of the chapter.
+fn outcome(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Pass => "reproduced",
+        Verdict::Fail => "not reproduced",
+        Verdict::Open => "open",
+    }
+}
+
+/// What a statement that is open with the profile quick needs.
+const UNDECIDED: &str =
+    "<small>Too few samples: <code>--profile standard</code> decides it.</small>";
+
+/// The statements of the chapter, one a row.
+fn statements(claims: &[&Claim], profile: Profile) -> Result<String, Failure> {
+    let mut rows = Vec::new();
+    for claim in claims {
+        let Some(quote) = claim.quote() else {
+            continue;
+        };
+        let note = match (claim.verdict, profile) {
+            (Verdict::Open, Profile::Quick) => UNDECIDED,
+            _ => "",
+        };
+        let statement = format!(
+            "<q>{}</q>\n{}",
+            typeset(quote),
+            folded("How it is judged", &details(claim), false)
+        );
+        rows.push(vec![
+            statement,
+            badge(claim.verdict.name(), outcome(claim.verdict)),
+            typeset(&claim.value()) + note,
+            link(&claim.figure),
+        ]);
+    }
+    if rows.is_empty() {
+        return Ok(String::new());
+    }
+    let header = ["The chapter", "Verdict", "This run", "Figure"];
+    Ok(format!(
+        "<h2 id=\"claims\">What the chapter says</h2>\n{}",
+        table("statements", &header, &rows)?
+    ))
+}
+
+/// A link to a figure by its id.
+fn link(id: &str) -> String {
+    let number = id.trim_start_matches("fig").trim_start_matches("tab");
+    let kind = if id.starts_with("tab") {
+        "Table"
+    } else {
+        "Figure"
+    };
+    let id = escape(id);
+    format!(
+        "<a href=\"#{id}\">{kind} {}</a>",
+        escape(number.trim_start_matches('0'))
+    )
+}
+
+/// How a claim is judged, what is expected, everything that was measured, and what would decide it.
+fn details(claim: &Claim) -> String {
+    let mut items = Vec::new();
+    if claim.kind() == Kind::Chapter {
+        items.push(("Judged", vec![claim.statement.clone()]));
+        items.push(("At", vec![claim.case().to_owned()]));
+    }
+    items.push(("Expected", vec![claim.expected.clone()]));
+    items.push(("Measured", listed(&claim.measured)));
+    if !claim.beside.is_empty() {
+        items.push(("Also", listed(&claim.beside)));
+    }
+    if !claim.decided_by.is_empty() {
+        items.push(("Decided by", vec![claim.decided_by.clone()]));
+    }
+    let mut list = format!("<dl>\n<dt>Number</dt><dd>{}</dd>\n", escape(&claim.id));
+    for (name, texts) in items {
+        list += &format!("<dt>{name}</dt>");
+        for text in texts {
+            list += &format!("<dd>{}</dd>", typeset(&text));
+        }
+        list += "\n";
+    }
+    list + "</dl>\n"
+}
+
+/// The parts of a text.
+fn listed(text: &str) -> Vec<String> {
+    text.split("; ").map(String::from).collect()
+}
+
+/// The program's own checks, unfolded where one fails.
+fn checks(claims: &[&Claim]) -> Result<String, Failure> {
+    let mut rows = Vec::new();
+    let mut fails = false;
+    for claim in claims {
+        if claim.kind() == Kind::Chapter {
+            continue;
+        }
+        fails |= claim.verdict == Verdict::Fail;
+        let statement = format!(
+            "{}\n{}",
+            typeset(&claim.statement),
+            folded("Details", &details(claim), false)
+        );
+        rows.push(vec![
+            statement,
+            badge(claim.verdict.name(), claim.verdict.name()),
+            typeset(&claim.value()),
+            link(&claim.figure),
+        ]);
+    }
+    let count = Count::new(claims.iter().copied(), Kind::Own);
+    let header = ["Check", "Verdict", "This run", "Figure"];
+    Ok(folded(
+        &format!("{count}"),
+        &table("statements", &header, &rows)?,
+        fails,
+    ))
+}
+
+fn timings(done: &Done<'_>) -> Result<String, Failure> {
+    let mut rows = Vec::new();
+    let mut all_s = 0.0;
+    for (figure, rendered) in done {
+        let [wall_s, core_s] = rendered.took_s;
+        all_s += core_s;
+        rows.push(vec![
+            link(figure.id),
+            typeset(figure.title),
+            format!("{wall_s:.1}"),
+            format!("{core_s:.1}"),
+        ]);
+    }
+    let header = [
+        "Figure",
+        "Title",
+        "Wall-clock time [s]",
+        "Processor time [s]",
+    ];
+    let summary = format!("{} of processor time in all", duration(all_s));
+    Ok(folded(&summary, &table("timings", &header, &rows)?, false))
 }
 
 /// Program, seed, profile and machine, and the command that makes the report again.
@@ -117,11 +376,11 @@ fn origin(context: &Context) -> String {
     let seed = context.seed;
     let command = format!("cargo xtask reproduce-figs --profile {profile} --seed {seed}");
     let items = [
-        ("version", wakescope_sim::PROGRAM.into()),
-        ("seed", seed.to_string()),
-        ("profile", profile.into()),
-        ("machine", machine()),
-        ("command", command),
+        ("Version", wakescope_sim::PROGRAM.into()),
+        ("Seed", seed.to_string()),
+        ("Profile", profile.into()),
+        ("Machine", machine()),
+        ("Command", command),
     ];
     let mut list = String::new();
     for (name, value) in items {
@@ -130,217 +389,10 @@ fn origin(context: &Context) -> String {
     list
 }
 
-/// Of a list of claims how many hold, do not, are open.
-pub(super) fn counted(kind: Kind, claims: &[&Claim]) -> String {
-    let mut holds = 0;
-    let mut fails = 0;
-    let mut open = 0;
-    for claim in claims.iter().filter(|claim| claim.kind() == kind) {
-        match claim.verdict {
-            Verdict::Pass => holds += 1,
-            Verdict::Fail => fails += 1,
-            Verdict::Open => open += 1,
-        }
-    }
-    let all = holds + fails + open;
-    format!("{all} claims: {holds} hold, {fails} do not, {open} are open")
-}
-
-/// How many claims hold, what the figures say in words, and what it took.
-fn found(context: &Context, done: &Done<'_>, run_s: f64) -> String {
-    let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
-    let core_s: f64 = done.iter().map(|(_, r)| r.took_s[1]).sum();
-    let mut words: Vec<&str> = done.iter().map(|(_, r)| r.words.as_str()).collect();
-    words.retain(|words| !words.is_empty());
-    format!(
-        "The chapter's {}; the program's own {} (profile {}). {} {} figures and tables took {core_s:.0} s of processor time; this \
-         run, with those that it found in the cache, {run_s:.0} s.",
-        counted(Kind::Chapter, &claims),
-        counted(Kind::Own, &claims),
-        context.profile.name(),
-        words.join(" "),
-        done.len()
-    )
-}
-
-/// A claim that does not hold or is not decided, and why.
-fn finding(class: &str, claim: &Claim, core_s: f64) -> String {
-    let Claim {
-        id,
-        figure,
-        statement,
-        expected,
-        measured,
-        decided_by,
-        ..
-    } = claim;
-    let said = if claim.kind() == Kind::Chapter {
-        format!("{} ", claim.source())
-    } else {
-        String::new()
-    };
-    let decided = match decided_by.as_str() {
-        "" => String::new(),
-        by => format!(" Would decide: {by}; the figure took {core_s:.0} s of processor time."),
-    };
-    let [id, figure, statement] = [id, figure, statement].map(|text| escape(text));
-    let reason = escape(&format!(
-        "{said}Expected: {expected}. Measured: {measured}.{decided}"
-    ));
-    format!(
-        "<div class=\"{class}\"><p><a href=\"#{figure}\">{id}</a> {statement}</p><p class=\"reason\">{reason}</p></div>\n"
-    )
-}
-
-/// A figure, or a table with its rows.
-fn entry(figure: &Figure, rendered: &Rendered) -> Result<String, Failure> {
-    let id = figure.id;
-    let mut marks = String::new();
-    for mark in &rendered.marks {
-        marks += &format!("<span class=\"mark\">{}</span>", escape(mark));
-    }
-    let content = if let Some(svg) = rendered.file("svg") {
-        picture(id, &String::from_utf8_lossy(svg))?
-    } else if let Some(csv) = rendered.file("csv") {
-        rows_of(id, &String::from_utf8_lossy(csv))?
-    } else {
-        String::new()
-    };
-    let heading = escape(&figure.heading());
-    let caption = escape(&rendered.caption);
-    Ok(format!(
-        "<figure id=\"{id}\">\n<h3>{heading}{marks}</h3>\n{content}<figcaption>{caption}</figcaption>\n</figure>\n"
-    ))
-}
-
-/// A picture that is one element without script.
-fn picture(id: &str, svg: &str) -> Result<String, Failure> {
-    if svg.starts_with("<svg") && !svg.contains("<script") {
-        return Ok(svg.to_owned());
-    }
-    let start: String = svg.chars().take(20).collect();
-    Err(Failure::new(format!(
-        "picture of {id} = {start}: one <svg> element without script"
-    )))
-}
-
-/// The rows of a table.
-fn rows_of(id: &str, csv: &str) -> Result<String, Failure> {
-    let mut lines = csv.lines().filter(|line| !line.starts_with('#'));
-    let header: Vec<&str> = lines
-        .next()
-        .map_or(Vec::new(), |line| line.split(',').collect());
-    let mut rows = Vec::new();
-    for line in lines {
-        rows.push(line.split(',').map(five_digits).collect());
-    }
-    table(id, &header, &rows)
-}
-
-/// A cell; if it is a number, rounded to five digits.
-fn five_digits(cell: &str) -> String {
-    let Ok(number) = cell.parse::<f64>() else {
-        return cell.to_owned();
-    };
-    let Ok(rounded) = format!("{number:.4e}").parse::<f64>() else {
-        return cell.to_owned();
-    };
-    if rounded.abs() < 1e-3 && rounded != 0.0 {
-        format!("{rounded:e}")
-    } else {
-        rounded.to_string()
-    }
-}
-
-fn claims(done: &Done<'_>) -> Result<String, Failure> {
-    let mut rows = Vec::new();
-    for (_, rendered) in done {
-        rows.extend(rendered.claims.iter().map(claim_row));
-    }
-    let header = [
-        "id",
-        "list",
-        "statement",
-        "expected",
-        "measured",
-        "standard error",
-        "verdict",
-    ];
-    table("claims", &header, &rows)
-}
-
-fn claim_row(claim: &Claim) -> Vec<String> {
-    let error = if claim.standard_error.is_nan() {
-        String::new()
-    } else {
-        two_digits(claim.standard_error)
-    };
-    vec![
-        claim.id.clone(),
-        claim.kind().name().to_owned(),
-        claim.statement.clone(),
-        claim.expected.clone(),
-        claim.measured.clone(),
-        error,
-        claim.verdict.name().to_owned(),
-    ]
-}
-
-fn timings(done: &Done<'_>) -> Result<String, Failure> {
-    let mut rows = Vec::new();
-    for (figure, rendered) in done {
-        let [wall_s, core_s] = rendered.took_s.map(|time_s| format!("{time_s:.1}"));
-        rows.push(vec![
-            figure.title.to_owned(),
-            STAGE.to_owned(),
-            wall_s,
-            core_s,
-        ]);
-    }
-    let header = [
-        "figure",
-        "stage",
-        "wall-clock time [s]",
-        "processor time [s]",
-    ];
-    table("timings", &header, &rows)
-}
-
-/// A table; on a narrow screen each row becomes a block of named cells. The words of verdicts are coloured.
-fn table(name: &str, header: &[&str], rows: &[Vec<String>]) -> Result<String, Failure> {
-    let header: Vec<String> = header.iter().map(|column| escape(column)).collect();
-    let mut names = String::new();
-    for column in &header {
-        names += &format!("<th>{column}</th>");
-    }
-    let mut out =
-        format!("<div class=\"scroll\"><table>\n<thead><tr>{names}</tr></thead>\n<tbody>\n");
-    for row in rows {
-        if row.len() != header.len() {
-            return Err(Failure::new(format!(
-                "table {name}: {} cells under {} names",
-                row.len(),
-                header.len()
-            )));
-        }
-        out += "<tr>";
-        for (cell, column) in row.iter().zip(&header) {
-            let is_verdict = ["pass", "fail", "open"].contains(&cell.as_str());
-            let class = if is_verdict {
-                format!(" class=\"{cell}\"")
-            } else {
-                String::new()
-            };
-            out += &format!("<td{class} data-label=\"{column}\">{}</td>", escape(cell));
-        }
-        out += "</tr>\n";
-    }
-    Ok(out + "</tbody></table></div>\n")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::figures::context::{Comparison, Difference};
     use crate::profile::Profile;
 
     const WILD: &str = "<script>alert('x & \"y\"')</script>";
@@ -352,6 +404,7 @@ mod tests {
             id,
             number: 1,
             title: WILD,
+            quick_core_s: 0.0,
             make,
         };
         let (drawn, listed) = (figure("fig01"), figure("tab01"));
@@ -361,16 +414,26 @@ mod tests {
             figure: WILD.into(),
             ..Claim::exact(id, WILD.into(), false).open(WILD)
         };
+        let difference = Difference {
+            interval: WILD.into(),
+            verdict: Verdict::Open,
+        };
+        let comparison = Comparison {
+            pulse: WILD.into(),
+            against: WILD.into(),
+            inside: difference.clone(),
+            outside: difference,
+        };
         let rendered = |extension: &str, bytes: &str| Rendered {
             files: vec![(extension.into(), bytes.as_bytes().to_vec())],
             caption: WILD.into(),
             values: Vec::new(),
             marks: vec![WILD.into()],
-            words: WILD.into(),
-            claims: vec![claim(WILD)],
+            comparison: vec![comparison.clone()],
+            claims: vec![claim(WILD), claim("F13")],
             took_s: [1.0, 2.0],
         };
-        let picture = "<svg xmlns=\"http://www.w3.org/2000/svg\"></svg>\n";
+        let picture = "<svg viewBox=\"0 0 2 1\"></svg>\n";
         let rows = format!("# head\n{WILD}\n{WILD}\n");
         let mut done = vec![
             (&drawn, rendered("svg", picture)),
@@ -396,16 +459,21 @@ mod tests {
     fn every_text_is_escaped_and_nothing_is_fetched() {
         let page = page(|_| {}).unwrap();
         assert!(!page.contains("<script"), "{page}");
-        // Of both: words; link, heading, caption, mark; title of the run times; of the claims six in the finding, four in
-        // the table; names and two cells of the table of rows.
+        // Of each figure: title of the thumbnail, heading, caption, mark, title of the run time; label of the picture.
+        let of_figures = 2 * 5 + 1;
+        // Of both claims statement, expected, measured, decided by, value and link, which has the figure twice; the number
+        // of the one that is not of the chapter.
+        let of_claims = 2 * (2 * 7 + 1);
+        let of_comparison = 4;
+        // Of the table a name, which phones show beside the cell, and a cell; both in the thumbnail.
+        let of_table = 3 + 2;
         assert_eq!(
             page.matches("&lt;script&gt;").count(),
-            2 * (1 + 4 + 1 + 6 + 4) + 3
+            of_figures + of_claims + of_comparison + of_table
         );
-        assert!(page.contains("<td class=\"open\" data-label="));
-        // What does not hold stands before the figures, and an empty list has no heading.
-        assert!(page.find("class=\"finding first\"").unwrap() < page.find("<figure").unwrap());
-        assert!(!page.contains(FINDINGS[0].0) && page.contains(FINDINGS[3].0));
+        assert!(page.contains("<span class=\"badge open\">open</span>"));
+        // Thumbnails stand before the figures that they lead to.
+        assert!(page.find("href=\"#fig01\"").unwrap() < page.find("<figure").unwrap());
         for outside in ["src=", "url(", "@import", "<link", "href=\"http"] {
             assert!(!page.contains(outside), "{outside}");
         }

@@ -1,6 +1,7 @@
 //! What is stable of flows: time schemes, stiff viscosity, pressure solvers, energy.
 
-use super::{Curve, Limit, NO_THEORY, Panel, logs};
+use super::{Curve, Limit, NO_THEORY, Panel, logs, thinned};
+use crate::profile::Profile;
 use fixtures::failure::Failure;
 use num_complex::Complex;
 use std::f64::consts::{PI, TAU};
@@ -285,7 +286,7 @@ fn left_by_theory(directions: Directions, viscous: f64) -> f64 {
 }
 
 /// The residual that an iteration of multigrid leaves, and what the direct solver leaves, on cells longer along y, or along x and y.
-pub(super) fn pressure() -> Result<Vec<Panel>, Failure> {
+pub(super) fn pressure(profile: Profile) -> Result<Vec<Panel>, Failure> {
     let multigrid = PressureMethod::Multigrid;
     let direct = PressureMethod::Direct;
     let cases = [
@@ -307,7 +308,8 @@ pub(super) fn pressure() -> Result<Vec<Panel>, Failure> {
         ),
     ];
     let curves = cases.map(|(name, pressure, directions)| {
-        Curve::new(name, &[1.0, 1e1, 1e2, 1e3, 1e4, 1e5], |aspect| {
+        let aspects = thinned(profile, &[1.0, 1e5], &[1.0, 1e1, 1e2, 1e3, 1e4, 1e5]);
+        Curve::new(name, aspects, |aspect| {
             let residual = worst_residual(pressure, directions, aspect)?;
             Ok([residual, NO_THEORY])
         })
@@ -396,16 +398,21 @@ pub(super) fn drift() -> Result<Vec<Panel>, Failure> {
 }
 
 /// Energy that steps feed beyond the powers of viscosity and subgrid stress, over what these take, as vortices break up into turbulence.
-pub(super) fn fed() -> Result<Vec<Panel>, Failure> {
+pub(super) fn fed(profile: Profile) -> Result<Vec<Panel>, Failure> {
     let models = [
         ("no model", SubgridModel::None),
         ("multiscale WALE", SubgridModel::MULTISCALE_WALE),
     ];
+    let courants = thinned(
+        profile,
+        &[0.4, 0.6, 1.0],
+        &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0],
+    );
     let mut curves = Vec::new();
     for (scheme_name, scheme) in SCHEMES {
         for (model_name, subgrid) in models {
             let mut points = Vec::new();
-            for courant in [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0] {
+            for &courant in courants {
                 // Where steps are refused there is no point.
                 if let Ok(fed) = fed_over_taken(scheme, subgrid, courant) {
                     points.push([courant, fed, NO_THEORY]);
@@ -453,14 +460,15 @@ fn power_m5_s3(step: &StepReport) -> f64 {
 }
 
 /// Energy of Taylor and Green's vortices on 16 cells a side after 150 steps, over that of the start.
-pub(super) fn reynolds() -> Result<Vec<Panel>, Failure> {
+pub(super) fn reynolds(profile: Profile) -> Result<Vec<Panel>, Failure> {
     let models = [
         ("no model", SubgridModel::None),
         ("WALE", SubgridModel::WALE),
         ("multiscale WALE", SubgridModel::MULTISCALE_WALE),
     ];
     let curves = models.map(|(name, subgrid)| {
-        Curve::new(name, &[1e3, 1e5, 1e8, 1e12], |reynolds| {
+        let reynolds = thinned(profile, &[1e3, 1e12], &[1e3, 1e5, 1e8, 1e12]);
+        Curve::new(name, reynolds, |reynolds| {
             Ok([
                 energy_left(16, reynolds, TimeScheme::RungeKutta3, subgrid, 150)?,
                 NO_THEORY,

@@ -1,6 +1,7 @@
 //! What is stable of optics, signals, estimators and fits.
 
-use super::{Curve, Limit, NO_THEORY, Panel, logs};
+use super::{Curve, Limit, NO_THEORY, Panel, logs, thinned};
+use crate::profile::Profile;
 use crate::work_precision::estimate::{Uniform, WINDOWS, bound_m_s};
 use fixtures::failure::Failure;
 use fixtures::uniform::{Air, BAND_M_S, errors};
@@ -30,7 +31,7 @@ const SEED: u64 = 1;
 const PULSE_S: f64 = 200e-9;
 
 /// Error of the free-space efficiency in the focus against the spacing of the grid over lambda F/(4 a), which the spectrum of the focused field asks for.
-pub(super) fn focus() -> Result<Vec<Panel>, Failure> {
+pub(super) fn focus(profile: Profile) -> Result<Vec<Panel>, Failure> {
     let curves = [150.0, 300.0, 600.0].map(|focus_m| {
         let telescope = Telescope {
             focus: Focus::At(focus_m),
@@ -40,7 +41,7 @@ pub(super) fn focus() -> Result<Vec<Panel>, Failure> {
         let asked_m = telescope.wavelength_m * focus_m / (4.0 * telescope.aperture_radius_m);
         Curve::new(
             format!("focus {focus_m} m"),
-            &[0.5, 0.6, 0.7, 0.8, 0.9, 0.99],
+            thinned(profile, &[0.5, 0.99], &[0.5, 0.6, 0.7, 0.8, 0.9, 0.99]),
             |share| {
                 let screens = MonteCarlo {
                     telescope,
@@ -65,10 +66,14 @@ pub(super) fn focus() -> Result<Vec<Panel>, Failure> {
 }
 
 /// What single precision changes of the efficiency of a pair of paths at 1500 m, in turbulence that is cut into ever more layers.
-pub(super) fn layers() -> Result<Vec<Panel>, Failure> {
-    let turbulence = [("Cn² 1e-15 m^(-2/3)", 1e-15), ("Cn² 1e-13 m^(-2/3)", 1e-13)];
+pub(super) fn layers(profile: Profile) -> Result<Vec<Panel>, Failure> {
+    let turbulence = [
+        ("C_{n}^{2} = 10^{−15} m^{−2/3}", 1e-15),
+        ("C_{n}^{2} = 10^{−13} m^{−2/3}", 1e-13),
+    ];
     let curves = turbulence.map(|(name, cn2_m_m23)| {
-        Curve::new(name, &[1.0, 10.0, 100.0, 1000.0], |layers| {
+        let layers = thinned(profile, &[1.0, 10.0, 100.0], &[1.0, 10.0, 100.0, 1000.0]);
+        Curve::new(name, layers, |layers| {
             let set_up = MonteCarlo {
                 grid: Grid::square(128, 4e-3)?,
                 layers: Layers::equal(layers as usize, 1500.0)?,
@@ -262,7 +267,7 @@ const DIRECTIONS: usize = 4;
 const NEAR: f64 = 0.02;
 
 /// Share of fits to an exact map of peaks that converge to the true pair, from starts whose vortices are so far from theirs, in all directions alike.
-pub(super) fn basins() -> Result<Vec<Panel>, Failure> {
+pub(super) fn basins(profile: Profile) -> Result<Vec<Panel>, Failure> {
     let sampling = sampling()?;
     let peak = SpectralPeak::new(
         &sampling,
@@ -288,7 +293,8 @@ pub(super) fn basins() -> Result<Vec<Panel>, Failure> {
         standard_deviation_m_s: None,
     };
     let name = format!("core {CORE_M} m");
-    let curve = Curve::new(name, &[10.0, 20.0, 30.0, 40.0, 60.0], |away_m| {
+    let away_m = thinned(profile, &[20.0, 60.0], &[10.0, 20.0, 30.0, 40.0, 60.0]);
+    let curve = Curve::new(name, away_m, |away_m| {
         let converged = (0..DIRECTIONS)
             .into_par_iter()
             .filter(|&direction| finds_the_pair(&map, &response, start(away_m, direction)));

@@ -8,6 +8,7 @@
 mod flow;
 mod lidar;
 
+use crate::profile::Profile;
 use fixtures::failure::Failure;
 use rayon::prelude::*;
 use wakescope_sim::io::Table;
@@ -89,30 +90,36 @@ const ROUND_OFF: f64 = 1e-9;
 /// Positive measurements below this are not drawn.
 const LEAST_DRAWN: f64 = 1e-17;
 
-type Measurement = fn() -> Result<Vec<Panel>, Failure>;
+/// What measures panels.
+type Measurement<'m> = &'m (dyn Fn() -> Result<Vec<Panel>, Failure> + Sync);
 
-/// All panels, in their order.
-pub(crate) fn measure() -> Result<Vec<Panel>, Failure> {
+/// All panels, in their order; with the profile quick fewer points of those that need the longest run time.
+pub(crate) fn measure(profile: Profile) -> Result<Vec<Panel>, Failure> {
     let panels: [Measurement; 13] = [
-        flow::growth,
-        flow::limits,
-        flow::stiff,
-        flow::pressure,
-        flow::drift,
-        flow::fed,
-        flow::reynolds,
-        lidar::focus,
-        lidar::layers,
-        lidar::phasors,
-        lidar::ratios,
-        lidar::orders,
-        lidar::basins,
+        &flow::growth,
+        &flow::limits,
+        &flow::stiff,
+        &|| flow::pressure(profile),
+        &flow::drift,
+        &|| flow::fed(profile),
+        &|| flow::reynolds(profile),
+        &|| lidar::focus(profile),
+        &|| lidar::layers(profile),
+        &lidar::phasors,
+        &lidar::ratios,
+        &lidar::orders,
+        &|| lidar::basins(profile),
     ];
     let panels = panels
         .into_par_iter()
         .map(|panel| panel())
         .collect::<Result<Vec<_>, Failure>>()?;
     Ok(panels.into_iter().flatten().collect())
+}
+
+/// Values of which the profile quick takes some.
+fn thinned<'v>(profile: Profile, quick: &'v [f64], all: &'v [f64]) -> &'v [f64] {
+    profile.choose(quick, all, all)
 }
 
 /// Largest distance of a point from the line of its theory, relative, where the theory is exact and above what round-off leaves.

@@ -3,6 +3,7 @@
 
 use super::{Found, Row, few, settings};
 use crate::cost::fastest;
+use crate::profile::Profile;
 use fixtures::failure::Failure;
 use std::path::Path;
 use wakescope_estimate::Measured;
@@ -17,8 +18,8 @@ use wakescope_sim::setup::progress::Silent;
 /// Realisations of the scan.
 const COUNTS: [f64; 6] = [2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
 
-/// All measurements; few realisations if `quick`.
-pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
+/// All measurements; few realisations unless `profile` is full.
+pub(super) fn rows(profile: Profile) -> Result<Vec<Row>, Failure> {
     let file = SceneFile::parse(include_str!("chain.toml"), Path::new("chain.toml"))?;
     let request = Request {
         within: 0.03,
@@ -36,7 +37,7 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     for row in &setting(&report, WINDOW_STEP)?.rows {
         // The gates that are left say nothing of the map.
         let shift = row.shift(Metric::Std).filter(|_| row.is_usable());
-        rows.extend(rows_of_step(&file, row.value, shift, of_one, quick)?);
+        rows.extend(rows_of_step(&file, row.value, shift, of_one, profile)?);
     }
     Ok(rows)
 }
@@ -48,7 +49,7 @@ fn rows_of_step(
     step: f64,
     shift: Option<Measured>,
     of_one: f64,
-    quick: bool,
+    profile: Profile,
 ) -> Result<Vec<Row>, Failure> {
     let method = if step == 1.0 {
         "windows at every sample".into()
@@ -56,7 +57,7 @@ fn rows_of_step(
         format!("windows {step} samples apart")
     };
     let counts = if shift.is_some() {
-        few(&COUNTS, quick)
+        few(&COUNTS, profile)
     } else {
         &COUNTS[..1]
     };

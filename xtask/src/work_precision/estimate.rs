@@ -5,6 +5,7 @@
 
 use super::{Found, Row, physics::SEED};
 use crate::cost::fastest;
+use crate::profile::Profile;
 use fixtures::failure::Failure;
 use fixtures::methods::{Known, Methods};
 use fixtures::uniform::{Air, BAND_M_S};
@@ -31,17 +32,17 @@ pub(crate) fn bound_m_s(known: &Known, windows: usize) -> Result<f64, Failure> {
 }
 
 /// All measurements; few trials if `quick`.
-pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
+pub(super) fn rows(profile: Profile) -> Result<Vec<Row>, Failure> {
     let cases = [
         ("0 dB, white", NoiseModel::White, 0.0),
         ("0 dB, band", NoiseModel::BandLimited, 0.0),
         ("20 dB, band", NoiseModel::BandLimited, 20.0),
     ];
-    let cases = if quick { &cases[..1] } else { &cases[..] };
-    let trials = if quick { 2000 } else { 6000 };
+    let cases = &cases[..profile.choose(1, 1, cases.len())];
+    let trials = profile.choose(2000, 2000, 6000);
     let mut rows = Vec::new();
     for &(case, noise, snr_db) in cases {
-        rows.extend(Uniform::new(noise, snr_db, trials)?.rows(case, quick)?);
+        rows.extend(Uniform::new(noise, snr_db, trials)?.rows(case, profile)?);
     }
     Ok(rows)
 }
@@ -125,7 +126,7 @@ impl Uniform {
         Ok(Row::new(names, value, found))
     }
 
-    fn rows(&self, case: &'static str, quick: bool) -> Result<Vec<Row>, Failure> {
+    fn rows(&self, case: &'static str, profile: Profile) -> Result<Vec<Row>, Failure> {
         let all = Methods::all(&self.known)?;
         let mut rows = Vec::new();
         for method in &all.methods {
@@ -142,7 +143,7 @@ impl Uniform {
             let peak = SpectralPeak::new(&s, kind, &lags, padded, Refinement::Parabola)?;
             rows.push(self.row(names, padded as f64, &plain, &peak)?);
         }
-        if quick {
+        if profile != Profile::Full {
             return Ok(rows);
         }
         for order in [4, 8, 16, 32] {

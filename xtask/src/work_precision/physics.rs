@@ -3,6 +3,7 @@
 
 use super::{Found, Row, few, settings};
 use crate::cost::{fastest, measured};
+use crate::profile::Profile;
 use crate::workspace::numbers;
 use fixtures::failure::Failure;
 use fixtures::pair::{PairCase, line_of_sight};
@@ -29,12 +30,12 @@ const CN2_M_M23: f64 = 1e-13;
 const RANGE_M: f64 = 1000.0;
 
 /// Screens, propagation and efficiency, and what layers of finite thickness do to it.
-pub(super) fn optics(quick: bool) -> Result<Vec<Row>, Failure> {
+pub(super) fn optics(profile: Profile) -> Result<Vec<Row>, Failure> {
     let mut rows = phase_screens::<f32>("f32, one of a pair")?;
     rows.extend(phase_screens::<f64>("f64, one of a pair")?);
     rows.extend(free_space::<f32>("f32, ten steps")?);
     rows.extend(free_space::<f64>("f64, ten steps")?);
-    rows.extend(bistatic(quick)?);
+    rows.extend(bistatic(profile)?);
     Ok(rows)
 }
 
@@ -82,9 +83,9 @@ fn free_space<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
 
 /// The bias of five layers by exact theory and the standard error of a mean, which falls from that of one run; the time is that of a
 /// realisation, the difference of a long and a short run, so that the set-up stands apart.
-fn bistatic(quick: bool) -> Result<Vec<Row>, Failure> {
-    let few = 40;
-    let many = if quick { 200 } else { 800 };
+fn bistatic(profile: Profile) -> Result<Vec<Row>, Failure> {
+    let few = profile.choose(20, 40, 40);
+    let many = profile.choose(100, 200, 800);
     let bias = layers_bias(5)?;
     let (_, short_cost) = measured(|| Ok(screens(5, Grid::square(256, 4e-3)?)?.run(few)?))?;
     let (long, long_cost) = measured(|| Ok(screens(5, Grid::square(256, 4e-3)?)?.run(many)?))?;
@@ -140,8 +141,8 @@ fn screens(layers: usize, grid: Grid) -> Result<MonteCarlo, Failure> {
 }
 
 /// Vortices that become turbulent, and what an unfinished pressure solve costs and leaves.
-pub(super) fn les(quick: bool) -> Result<Vec<Row>, Failure> {
-    let mut rows = taylor_green(quick)?;
+pub(super) fn les(profile: Profile) -> Result<Vec<Row>, Failure> {
+    let mut rows = taylor_green(profile)?;
     for (method, pressure) in [
         ("direct", PressureMethod::Direct),
         ("multigrid", PressureMethod::Multigrid),
@@ -149,7 +150,7 @@ pub(super) fn les(quick: bool) -> Result<Vec<Row>, Failure> {
         let knob = ["pressure", method, "tolerance"];
         rows.extend(settings(
             knob,
-            few(&[1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12], quick),
+            few(&[1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12], profile),
             |tolerance| {
                 let mut case = cases::taylor_green_3d(32, 1600.0)?;
                 case.settings.pressure = pressure;
@@ -180,17 +181,14 @@ fn lost_energy(energy: &[f64]) -> Vec<f64> {
 }
 
 /// The rate at which the vortices lose energy until t = 10, root mean square error over the peak.
-fn taylor_green(quick: bool) -> Result<Vec<Row>, Failure> {
+fn taylor_green(profile: Profile) -> Result<Vec<Row>, Failure> {
     let stored = numbers("tgv_re200_fourier96.csv")?;
     let reference: Vec<f64> = stored.iter().step_by(2).map(|row| row[1]).collect();
     let exact = lost_energy(&reference);
     let peak = exact.iter().copied().fold(0.0, f64::max);
     // Steps that divide the outputs, at a Courant number of about one half.
-    let cells: &[f64] = if quick {
-        &[12.0, 16.0, 24.0, 32.0, 48.0]
-    } else {
-        &[12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0]
-    };
+    const CELLS: [f64; 7] = [12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0];
+    let cells = &CELLS[..profile.choose(3, 5, 7)];
     let knob = [
         "Taylor-Green vortices, Re 200",
         "Runge-Kutta 3",
@@ -255,10 +253,10 @@ fn line(simulator: &Simulator, samples: usize, parts: usize) -> Result<LineOfSig
 }
 
 /// What the thickness of layers does to the covariance of a gate in a core, and costs a record.
-pub(super) fn signal(quick: bool) -> Result<Vec<Row>, Failure> {
+pub(super) fn signal(profile: Profile) -> Result<Vec<Row>, Failure> {
     const GATE: usize = 128;
     const SAMPLES: usize = 300;
-    let records = if quick { 4 } else { 40 };
+    let records = profile.choose(4, 4, 40);
     let mut rows = Vec::new();
     for (case, pulse_s) in [("records, 200 ns", 200e-9), ("records, 400 ns", 400e-9)] {
         let knob = [case, "record of 300 samples", "layers for each sample"];
@@ -268,7 +266,7 @@ pub(super) fn signal(quick: bool) -> Result<Vec<Row>, Failure> {
         let largest = exact.iter().map(|value| value.norm()).fold(0.0, f64::max);
         rows.extend(settings(
             knob,
-            few(&[1.0, 2.0, 3.0, 4.0, 6.0], quick),
+            few(&[1.0, 2.0, 3.0, 4.0, 6.0], profile),
             |parts| {
                 let found = gate.covariance_a2(&line(&gate, GATE, parts as usize)?)?;
                 let error = (&found - &exact)
