@@ -13,6 +13,7 @@ mod claim;
 mod cost;
 mod figures;
 mod fit_trials;
+mod key_tables;
 mod left_out;
 mod process;
 mod profile;
