@@ -21,11 +21,7 @@ const METHODS: [&str; 4] = [
 ];
 
 /// A fitted wake with its covariance.
-#[derive(Clone)]
-struct Found {
-    wake: Wake,
-    covariance: Array2<f64>,
-}
+type Found = (Wake, Array2<f64>);
 
 /// Fits of one scan; nothing where one failed.
 struct Fits {
@@ -40,10 +36,9 @@ impl Fits {
     fn parameter(&self, method: usize, parameter: Parameter) -> (f64, f64) {
         let index = parameter as usize;
         match self.by_method.get(method) {
-            Some(Some(found)) => (
-                found.wake.to_array()[index],
-                found.covariance[[index; 2]].sqrt(),
-            ),
+            Some(Some((wake, covariance))) => {
+                (wake.to_array()[index], covariance[[index; 2]].sqrt())
+            }
             _ => (f64::NAN, f64::NAN),
         }
     }
@@ -126,10 +121,7 @@ fn fit_map(trial: &FitTrial) -> Vec<Option<Found>> {
             ..free()
         };
         let fit = trial.map(free, Some(CorePrior::TYPICAL)).ok();
-        fits.push(fit.map(|fit| Found {
-            wake: fit.wake,
-            covariance: fit.covariance,
-        }));
+        fits.push(fit.map(|fit| (fit.wake, fit.covariance)));
     }
     fits
 }
@@ -137,7 +129,7 @@ fn fit_map(trial: &FitTrial) -> Vec<Option<Found>> {
 /// The fits of the signals of one scan, started from a fit of its map.
 fn fit_signals(trial: &FitTrial, start: Option<&Found>) -> [Option<Found>; 2] {
     [Sharing::Fixed, Sharing::Common].map(|core_radius| {
-        let mut guess = start?.wake;
+        let mut guess = start?.0;
         if core_radius == Sharing::Fixed {
             guess.left.core_radius_m = truth().left.core_radius_m;
             guess.right.core_radius_m = truth().right.core_radius_m;
@@ -147,10 +139,7 @@ fn fit_signals(trial: &FitTrial, start: Option<&Found>) -> [Option<Found>; 2] {
             ..free()
         };
         let fit = trial.signals(free, &guess, Starts::Several).ok()?;
-        Some(Found {
-            wake: fit.wake,
-            covariance: fit.covariance,
-        })
+        Some((fit.wake, fit.covariance))
     })
 }
 

@@ -36,25 +36,29 @@ const LINES: usize = 60;
 /// Standard deviation of the weight of gates that do not resolve cores \[m\], as `retrieve` has it.
 const LONG_GATE_M: f64 = 3.0;
 
-/// Names of profiles in the list of kinds.
-#[derive(Deserialize)]
-#[serde(remote = "CoreProfile", rename_all = "snake_case")]
-enum ProfileName {
-    Algebraic,
-    LambOseen,
-}
-
 /// Pairs of vortices and their secondary vortices; scenes with them have gates, noise and times of
 /// their own.
 #[derive(Deserialize)]
 struct WakeKind {
     name: String,
-    #[serde(with = "ProfileName")]
+    #[serde(deserialize_with = "profile")]
     profile: CoreProfile,
     /// Least and largest height of the vortices \[m\].
     height_m: [f64; 2],
     /// Least and largest spacing of the vortices \[m\].
     spacing_m: [f64; 2],
+}
+
+/// A profile by its name in the list of kinds.
+fn profile<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<CoreProfile, D::Error> {
+    match String::deserialize(deserializer)?.as_str() {
+        "algebraic" => Ok(CoreProfile::Algebraic),
+        "lamb_oseen" => Ok(CoreProfile::LambOseen),
+        name => Err(serde::de::Error::unknown_variant(
+            name,
+            &["algebraic", "lamb_oseen"],
+        )),
+    }
 }
 
 /// Maps of means over gates.

@@ -33,21 +33,30 @@ const ROUND_OFF: f64 = 1e-24;
 /// A pressure tolerance above this may itself feed energy.
 pub(super) const LOOSE: f64 = 1e-6;
 
-/// The bound on the energy as a run goes.
+/// What a run remembers of the energy of its steps, and keeps in its checkpoints.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct EnergyBound {
+pub(super) struct EnergyAccount {
+    /// The budget of the last step, which waits for the powers at its end: those at its start.
+    pub(super) open: Option<EnergyBudget>,
     /// What the flow may have without walls that move \[m^5/s^2\].
     pub(super) bound_m5_s2: f64,
     /// Largest energy so far \[m^5/s^2\].
     pub(super) largest_m5_s2: f64,
+    /// Residuals of the budgets of up to [`STEPS`] steps \[m^5/s^3\].
+    pub(super) fed_m5_s3: f64,
+    /// What viscosity and model took in these steps \[m^5/s^3\].
+    pub(super) taken_m5_s3: f64,
 }
 
-impl EnergyBound {
+impl EnergyAccount {
     pub(super) fn new(flow: &Flow) -> Self {
         let energy = flow.kinetic_energy_m5_s2();
         Self {
+            open: None,
             bound_m5_s2: energy,
             largest_m5_s2: energy,
+            fed_m5_s3: 0.0,
+            taken_m5_s3: 0.0,
         }
     }
 
@@ -71,6 +80,46 @@ impl EnergyBound {
         self.largest_m5_s2 = self.largest_m5_s2.max(energy);
         self.bound_m5_s2 = energy.min(forced).max(ROUND_OFF * self.largest_m5_s2);
         Ok(())
+    }
+
+    /// Takes the budget that `report` closed, open with the power at its start and the mean of both
+    /// ends.
+    pub(super) fn add(&mut self, open: EnergyBudget, closed: EnergyBudget, report: &StepReport) {
+        let residual = closed.residual_m5_s3();
+        let uncertain = (closed.power_m5_s3 - open.power_m5_s3).abs();
+        self.fed_m5_s3 += residual.signum() * (residual.abs() - uncertain).max(0.0);
+        self.taken_m5_s3 += report.viscous_power_m5_s3.abs() + report.subgrid_power_m5_s3.abs();
+    }
+
+    /// What it adds up to after its last step, if that is more than a tenth of what viscosity and
+    /// model took; then it is empty.
+    pub(super) fn close(&mut self, flow: &Flow, report: &StepReport) -> Option<StepEnergy> {
+        if !report.step.is_multiple_of(STEPS) {
+            return None;
+        }
+        let fed_m5_s3 = std::mem::take(&mut self.fed_m5_s3);
+        let taken_m5_s3 = std::mem::take(&mut self.taken_m5_s3);
+        let settings = flow.settings();
+        let energy = StepEnergy {
+            share: fed_m5_s3 / taken_m5_s3,
+            courant: report.courant,
+            scheme: settings.scheme,
+            pressure_tolerance: settings.pressure_tolerance,
+        };
+        let mut walls = flow.mesh().directions().iter().flat_map(|d| d.ends.walls());
+        let is_driven = walls
+            .any(|wall| matches!(wall, Wall::NoSlip { velocity_m_s } if velocity_m_s != [0.0; 3]));
+        if is_driven || !flow.stiffness().is_resolved(report.step_s) {
+            return None;
+        }
+        let negligible = if taken_m5_s3 > 0.0 {
+            NEGLIGIBLE
+        } else {
+            UNDAMPED_NEGLIGIBLE
+        };
+        let is_significant =
+            fed_m5_s3.abs() * report.step_s > negligible * report.kinetic_energy_m5_s2;
+        (is_significant && energy.share.abs() > REPORTED).then_some(energy)
     }
 }
 
@@ -235,58 +284,5 @@ impl std::fmt::Display for StepEnergy {
             suited if suited > 0.0 => write!(f, "take a Courant number of at most {suited:.2}"),
             _ => write!(f, "half the step does an eighth of it"),
         }
-    }
-}
-
-/// Sums over the steps since the last one whose number is a multiple of [`STEPS`].
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Window {
-    /// Residuals of the budgets \[m^5/s^3\].
-    pub(super) fed_m5_s3: f64,
-    /// What viscosity and model took \[m^5/s^3\].
-    pub(super) taken_m5_s3: f64,
-}
-
-impl Window {
-    /// Takes the budget that `report` closed, open with the power at its start and the mean of both
-    /// ends.
-    pub(super) fn add(&mut self, open: EnergyBudget, closed: EnergyBudget, report: &StepReport) {
-        let residual = closed.residual_m5_s3();
-        let uncertain = (closed.power_m5_s3 - open.power_m5_s3).abs();
-        self.fed_m5_s3 += residual.signum() * (residual.abs() - uncertain).max(0.0);
-        self.taken_m5_s3 += report.viscous_power_m5_s3.abs() + report.subgrid_power_m5_s3.abs();
-    }
-
-    /// What it adds up to after its last step, if that is more than a tenth of what viscosity and
-    /// model took; then it is empty.
-    pub(super) fn close(&mut self, flow: &Flow, report: &StepReport) -> Option<StepEnergy> {
-        if !report.step.is_multiple_of(STEPS) {
-            return None;
-        }
-        let Self {
-            fed_m5_s3,
-            taken_m5_s3,
-        } = std::mem::take(self);
-        let settings = flow.settings();
-        let energy = StepEnergy {
-            share: fed_m5_s3 / taken_m5_s3,
-            courant: report.courant,
-            scheme: settings.scheme,
-            pressure_tolerance: settings.pressure_tolerance,
-        };
-        let mut walls = flow.mesh().directions().iter().flat_map(|d| d.ends.walls());
-        let is_driven = walls
-            .any(|wall| matches!(wall, Wall::NoSlip { velocity_m_s } if velocity_m_s != [0.0; 3]));
-        if is_driven || !flow.stiffness().is_resolved(report.step_s) {
-            return None;
-        }
-        let negligible = if taken_m5_s3 > 0.0 {
-            NEGLIGIBLE
-        } else {
-            UNDAMPED_NEGLIGIBLE
-        };
-        let is_significant =
-            fed_m5_s3.abs() * report.step_s > negligible * report.kinetic_energy_m5_s2;
-        (is_significant && energy.share.abs() > REPORTED).then_some(energy)
     }
 }

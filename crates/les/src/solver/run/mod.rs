@@ -24,7 +24,7 @@ use super::report::StepReport;
 use super::settings::FlowSettings;
 use super::subgrid::SubgridModel;
 use crate::error::{Error, check};
-use energy::{EnergyBound, Window};
+use energy::EnergyAccount;
 pub use energy::{EnergyBudget, StepEnergy};
 
 /// A step shorter than this fraction of the time of the run does not lead to its end.
@@ -143,21 +143,12 @@ impl RunObserver for Silent {}
 pub struct Run {
     flow: Flow,
     plan: RunPlan,
-    state: RunState,
+    energy: EnergyAccount,
     has_warned_of_energy: bool,
     has_warned_of_growth: bool,
     is_fresh: bool,
     steps_wall_s: f64,
     exchange_wall_s: f64,
-}
-
-/// What a run remembers of its steps, and keeps in its checkpoints beside the flow.
-#[derive(Debug, Clone, Copy)]
-struct RunState {
-    /// The budget of the last step, which waits for the powers at its end: those at its start.
-    open: Option<EnergyBudget>,
-    energy: EnergyBound,
-    window: Window,
 }
 
 impl Run {
@@ -168,12 +159,8 @@ impl Run {
     /// intervals.
     pub fn new(flow: Flow, plan: RunPlan) -> Result<Self, Error> {
         plan.check(flow.time_s())?;
-        let state = RunState {
-            open: None,
-            energy: EnergyBound::new(&flow),
-            window: Window::default(),
-        };
-        Ok(Self::from_parts(flow, plan, state, true))
+        let energy = EnergyAccount::new(&flow);
+        Ok(Self::from_parts(flow, plan, energy, true))
     }
 
     /// A run that continues from a checkpoint written by a run, with the bytes that the observer
@@ -190,7 +177,7 @@ impl Run {
         let path = path.as_ref();
         let (flow, bytes) = Flow::restore(path, mesh, settings)?;
         let what = "it was written by another kind of program";
-        let Some((state, user_data)) = RunState::read(&bytes) else {
+        let Some((energy, user_data)) = EnergyAccount::read(&bytes) else {
             return Err(Error::CheckpointDamaged {
                 path: path.to_owned(),
                 what,
@@ -198,16 +185,16 @@ impl Run {
         };
         plan.check(f64::NEG_INFINITY)?;
         Ok((
-            Self::from_parts(flow, plan, state, false),
+            Self::from_parts(flow, plan, energy, false),
             user_data.to_vec(),
         ))
     }
 
-    fn from_parts(flow: Flow, plan: RunPlan, state: RunState, is_fresh: bool) -> Self {
+    fn from_parts(flow: Flow, plan: RunPlan, energy: EnergyAccount, is_fresh: bool) -> Self {
         Self {
             flow,
             plan,
-            state,
+            energy,
             has_warned_of_energy: false,
             has_warned_of_growth: false,
             is_fresh,
@@ -268,7 +255,7 @@ impl Run {
             }
             let record = self.record(report, energy)?;
             self.all_agree(observer.step(&self.flow, &record))?;
-            self.state.energy.pass(&self.flow, energy, report.step_s)?;
+            self.energy.pass(&self.flow, energy, report.step_s)?;
             self.check_step_energy(&report, observer)?;
             self.give_outputs(&mut next_output, observer)?;
             if self.checkpoint_is_due(before_s, &report) {
@@ -363,7 +350,7 @@ impl Run {
         report: &StepReport,
         observer: &mut dyn RunObserver,
     ) -> Result<(), Error> {
-        let Some(energy) = self.state.window.close(&self.flow, report) else {
+        let Some(energy) = self.energy.close(&self.flow, report) else {
             return Ok(());
         };
         if energy.share > 1.0 && energy.share.is_finite() {
@@ -413,15 +400,15 @@ impl Run {
     fn record(&mut self, report: StepReport, energy_before: f64) -> Result<StepRecord, Error> {
         let power_m5_s3 =
             report.viscous_power_m5_s3 + report.subgrid_power_m5_s3 + report.force_power_m5_s3;
-        let budget_before = self.state.open.map(|open| EnergyBudget {
+        let budget_before = self.energy.open.map(|open| EnergyBudget {
             power_m5_s3: 0.5 * (open.power_m5_s3 + power_m5_s3),
             ..open
         });
-        if let (Some(open), Some(closed)) = (self.state.open, budget_before) {
-            self.state.window.add(open, closed, &report);
+        if let (Some(open), Some(closed)) = (self.energy.open, budget_before) {
+            self.energy.add(open, closed, &report);
         }
         let rate_m5_s3 = (report.kinetic_energy_m5_s2 - energy_before) / report.step_s;
-        self.state.open = Some(EnergyBudget {
+        self.energy.open = Some(EnergyBudget {
             step: report.step,
             rate_m5_s3,
             power_m5_s3,
@@ -458,7 +445,7 @@ impl Run {
         };
         let mut previous = plan.path.clone().into_os_string();
         previous.push(".previous");
-        let bytes = [self.state.bytes(), observer.user_data()].concat();
+        let bytes = [self.energy.bytes(), observer.user_data()].concat();
         self.flow
             .save_and_keep(&plan.path, Some(Path::new(&previous)), &bytes)
     }
@@ -503,7 +490,7 @@ impl RunPlan {
     }
 }
 
-impl RunState {
+impl EnergyAccount {
     /// The first number is 3 if a budget is open, else 2.
     fn bytes(&self) -> Vec<u8> {
         let [kind, step, rate, power] = self.open.map_or([2, 0, 0, 0], |b| {
@@ -514,10 +501,10 @@ impl RunState {
             step,
             rate,
             power,
-            self.energy.bound_m5_s2.to_bits(),
-            self.energy.largest_m5_s2.to_bits(),
-            self.window.fed_m5_s3.to_bits(),
-            self.window.taken_m5_s3.to_bits(),
+            self.bound_m5_s2.to_bits(),
+            self.largest_m5_s2.to_bits(),
+            self.fed_m5_s3.to_bits(),
+            self.taken_m5_s3.to_bits(),
         ];
         numbers.into_iter().flat_map(u64::to_le_bytes).collect()
     }
@@ -537,22 +524,18 @@ impl RunState {
             rate_m5_s3,
             power_m5_s3,
         };
-        let state = Self {
+        let energy = Self {
             open: match u64::from_le_bytes(kind) {
                 2 => None,
                 3 => Some(open),
                 _ => return None,
             },
-            energy: EnergyBound {
-                bound_m5_s2: bound,
-                largest_m5_s2: largest,
-            },
-            window: Window {
-                fed_m5_s3: fed,
-                taken_m5_s3: taken,
-            },
+            bound_m5_s2: bound,
+            largest_m5_s2: largest,
+            fed_m5_s3: fed,
+            taken_m5_s3: taken,
         };
-        Some((state, user_data))
+        Some((energy, user_data))
     }
 }
 

@@ -352,34 +352,25 @@ pub(crate) fn samples<S: Sample>(
         .map_err(|_| records.refuse("it became shorter".into()))
 }
 
-/// Sizes and means of the samples of a file.
-#[derive(Default)]
-struct Survey {
-    sizes: SampleSizes,
-    any: bool,
-    /// Mean of the first parts of the samples of each record that has some.
-    means: Vec<f64>,
-}
-
-impl Survey {
-    fn of(records: &mut RawRecords) -> Result<Self, Error> {
-        let mut out = Self::default();
-        for piece in pieces(0..records.records, records.samples) {
-            for record in records.read(piece)?.chunks(records.samples) {
-                let (mut sum, mut count) = (0.0, 0.0);
-                for sample in record.iter().filter(|sample| sample.is_finite()) {
-                    out.any = true;
-                    out.sizes.add(sample.largest_part());
-                    sum += sample.re;
-                    count += 1.0;
-                }
-                if count > 0.0 {
-                    out.means.push(sum / count);
-                }
+/// Sizes of the samples of a file, and the mean of the first parts of each record that has some.
+fn survey(records: &mut RawRecords) -> Result<(SampleSizes, Vec<f64>), Error> {
+    let mut sizes = SampleSizes::default();
+    let mut means = Vec::new();
+    for piece in pieces(0..records.records, records.samples) {
+        for record in records.read(piece)?.chunks(records.samples) {
+            let mut sum = 0.0;
+            let mut count = 0.0;
+            for sample in record.iter().filter(|sample| sample.is_finite()) {
+                sizes.add(sample.largest_part());
+                sum += sample.re;
+                count += 1.0;
+            }
+            if count > 0.0 {
+                means.push(sum / count);
             }
         }
-        Ok(out)
     }
+    Ok((sizes, means))
 }
 
 /// Fewest records that show whether their mean is none of chance.
@@ -408,14 +399,14 @@ fn largest_part(
     records: &mut RawRecords,
     observer: &dyn Observer,
 ) -> Result<f64, Error> {
-    let survey = Survey::of(records)?;
+    let (sizes, means) = survey(records)?;
     let outsized = |records: &RawRecords, sizes: &SampleSizes| match records.are_integers {
         true => f64::INFINITY,
         false => sizes.outsized(),
     };
-    records.outsized = outsized(records, &survey.sizes);
-    let largest = survey.sizes.largest_below(records.outsized);
-    if !survey.any {
+    records.outsized = outsized(records, &sizes);
+    let largest = sizes.largest_below(records.outsized);
+    if means.is_empty() {
         return Err(
             records.refuse("all of its samples are missing: none is a finite number".into())
         );
@@ -434,7 +425,7 @@ fn largest_part(
     }
     let offset = match is_own || records.is_complex {
         true => None,
-        false => constant_offset(&survey.means),
+        false => constant_offset(&means),
     };
     let Some(offset) = offset else {
         return Ok(largest);
@@ -445,7 +436,7 @@ fn largest_part(
     ));
     records.zero += offset / records.scale;
     records.outsized = f64::INFINITY;
-    let sizes = Survey::of(records)?.sizes;
+    let (sizes, _) = survey(records)?;
     records.outsized = outsized(records, &sizes);
     Ok(sizes.largest_below(records.outsized))
 }
