@@ -6,7 +6,7 @@
 use crate::process::call;
 use crate::profile::Profile;
 use crate::workspace::{built, root};
-use crate::{audit, key_tables, left_out, work_precision};
+use crate::{audit, column_tables, key_tables, left_out, work_precision};
 use fixtures::failure::Outcome;
 use std::path::Path;
 use std::process::Command;
@@ -16,8 +16,9 @@ use walkdir::WalkDir;
 const PRIVATE_PACKAGES: [&str; 3] = ["xtask", "fixtures", "wakescope-tests"];
 
 /// Files beside the pages that this task makes.
-pub(crate) const RESULTS: [&str; 6] = [
+pub(crate) const RESULTS: [&str; 7] = [
     KEYS,
+    COLUMNS,
     AUDIT,
     LEFT_OUT,
     WORK_PRECISION,
@@ -25,6 +26,7 @@ pub(crate) const RESULTS: [&str; 6] = [
     WORK_PRECISION_SVG,
 ];
 const KEYS: &str = "keys-tables.md";
+const COLUMNS: &str = "columns-table.md";
 const AUDIT: &str = "audit-results.md";
 const LEFT_OUT: &str = "left-out-results.md";
 const WORK_PRECISION: &str = "work-precision-results.md";
@@ -58,6 +60,7 @@ pub(crate) fn run() -> Outcome {
 /// Runs the commands whose results pages include.
 fn write_results(pages: &Path) -> Outcome {
     std::fs::write(pages.join(KEYS), key_tables::page()?)?;
+    std::fs::write(pages.join(COLUMNS), column_tables::page()?)?;
     std::fs::write(pages.join(AUDIT), audit::page()?)?;
     std::fs::write(pages.join(LEFT_OUT), left_out::page()?)?;
     let rows = work_precision::measure(None, Profile::Full)?;

@@ -10,6 +10,7 @@ mod book;
 mod cause;
 mod ci;
 mod claim;
+mod column_tables;
 mod cost;
 mod figures;
 mod fit_trials;
