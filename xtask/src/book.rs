@@ -3,7 +3,7 @@
 //! Tables that a command makes are not stored: the commands run here, and a copy of the pages gets
 //! their results.
 
-use crate::process::call;
+use crate::process::{call, program};
 use crate::profile::Profile;
 use crate::workspace::{built, root};
 use crate::{audit, column_tables, key_tables, left_out, work_precision};
@@ -33,6 +33,9 @@ const WORK_PRECISION: &str = "work-precision-results.md";
 const WORK_PRECISION_CSV: &str = "images/work_precision.csv";
 const WORK_PRECISION_SVG: &str = "images/work_precision.svg";
 
+/// Folder of the pictures that commands of the gallery make.
+pub(crate) const GALLERY: &str = "gallery/";
+
 /// Builds both into `target/book`.
 ///
 /// # Errors
@@ -42,6 +45,7 @@ pub(crate) fn run() -> Outcome {
     let copy = root().join("target/book-pages");
     copy_folder(&root().join("docs"), &copy)?;
     write_results(&copy.join("src"))?;
+    draw_gallery(&copy.join("src"))?;
     // First, since mdBook empties the folder.
     let mut mdbook = Command::new("mdbook");
     mdbook.arg("build").arg(&copy).arg("--dest-dir").arg(&book);
@@ -70,6 +74,35 @@ fn write_results(pages: &Path) -> Outcome {
     std::fs::write(pages.join(WORK_PRECISION), work_precision::text(&rows))?;
     std::fs::write(pages.join(WORK_PRECISION_CSV), csv)?;
     std::fs::write(pages.join(WORK_PRECISION_SVG), svg)?;
+    Ok(())
+}
+
+/// Runs the commands of the gallery in the folder of its pictures.
+fn draw_gallery(pages: &Path) -> Outcome {
+    let folder = pages.join(GALLERY);
+    std::fs::create_dir_all(&folder)?;
+    let wakescope = program(None)?;
+    let page = std::fs::read_to_string(pages.join("gallery.md"))?;
+    for line in page.lines() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let (mut command, arguments) = match words.as_slice() {
+            ["wakescope", arguments @ ..] => (Command::new(&wakescope), arguments),
+            ["cargo", "xtask", arguments @ ..] => {
+                (Command::new(std::env::current_exe()?), arguments)
+            }
+            _ => continue,
+        };
+        command.args(arguments).current_dir(&folder);
+        call(&mut command)?;
+    }
+    for entry in std::fs::read_dir(root().join("target/figures"))? {
+        let path = entry?.path();
+        if let Some(name) = path.file_name()
+            && path.extension().is_some_and(|end| end == "svg")
+        {
+            std::fs::copy(&path, folder.join(name))?;
+        }
+    }
     Ok(())
 }
 

@@ -1,7 +1,7 @@
 //! What pages link to and name: files, headings, folders of the sources, tests.
 
 use super::SourceFile;
-use crate::book::RESULTS;
+use crate::book::{GALLERY, RESULTS};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Folders of the sources: what a page sets as code and begins with one of these is a path.
@@ -85,7 +85,8 @@ impl Known<'_> {
         };
         let is_made = RESULTS
             .iter()
-            .any(|made| path == format!("docs/src/{made}"));
+            .any(|made| path == format!("docs/src/{made}"))
+            || path.starts_with(&format!("docs/src/{GALLERY}"));
         if path.starts_with(API) || is_made {
             return Ok(());
         }

@@ -155,6 +155,28 @@ fn commands_of_the_tutorials_run() {
     }
 }
 
+/// The chapter's figures are drawn by the task of continuous integration that judges them.
+#[test]
+fn commands_of_the_gallery_make_its_pictures() {
+    let page = std::fs::read_to_string(root().join("docs/src/gallery.md")).unwrap();
+    let temp = tempfile::tempdir().unwrap();
+    for line in page.lines().filter(|line| line.starts_with("wakescope ")) {
+        let words: Vec<&str> = line.split_whitespace().skip(1).collect();
+        let out = wakescope(temp.path(), &[&words[..], &["--quiet"]].concat());
+        let complaint = String::from_utf8_lossy(&out.stderr);
+        assert!(out.status.success(), "{line}: {complaint}");
+    }
+    let mut pictures = 0;
+    for rest in page.split("](gallery/").skip(1) {
+        let (name, _) = rest.split_once(')').unwrap();
+        if !name.starts_with("fig") {
+            assert!(temp.path().join(name).is_file(), "{name}");
+            pictures += 1;
+        }
+    }
+    assert!(pictures >= 8, "{pictures}");
+}
+
 /// With `--help` at its end a line is parsed and nothing runs.
 #[test]
 fn lines_of_the_program_that_pages_show_are_understood() {
