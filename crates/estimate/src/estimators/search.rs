@@ -30,6 +30,10 @@ pub(crate) const FULL_WIDTH: f64 = 2.354_820_045_030_949;
 /// Share of the highest density in the lowest below which there is no noise beneath a peak that fills the band.
 const BARE: f64 = 0.02;
 
+/// Full widths of the peak that the bins beside it must hold for its width to be measured above
+/// noise.
+const LEAST_BESIDE: f64 = 0.5;
+
 /// Half-widths at half maximum on each side that belong to the main peak; beyond them a Gaussian is below 2e-5.
 const LOBE: f64 = 4.0;
 
@@ -77,7 +81,8 @@ pub(crate) struct Located {
     pub(crate) sum: f64,
     /// Mean density beside the main peak.
     floor: f64,
-    /// Standard deviation of the main peak \[bins\]; NaN where it fills the band with noise beneath, which then is not known.
+    /// Standard deviation of the main peak \[bins\]; NaN where it nearly fills the band with noise
+    /// beneath, which then is not known.
     width: f64,
     pub(crate) flag: Quality,
 }
@@ -327,17 +332,20 @@ fn floor_and_width(density: &[f64], top: usize, peak: f64) -> (f64, f64) {
             if value < low { value } else { low }
         })
     });
-    let (mut floor, mut beside) = (0.0, None);
+    let mut floor = 0.0;
+    let mut beside = 0;
     let mut reach = [0.0; 2];
     // the half height needs the floor and the floor the half height: one repetition settles it
     for _ in 0..2 {
         reach = half_widths(density, top, floor + 0.5 * (peak - floor));
-        beside = mean_beside(density, top, reach);
-        floor = beside.unwrap_or_else(|| *lowest);
+        (floor, beside) = mean_beside(density, top, reach).unwrap_or_else(|| (*lowest, 0));
     }
-    let is_bare = beside.is_some() || *lowest < BARE * peak;
-    let width = if is_bare {
-        (reach[0] + reach[1]) / FULL_WIDTH
+    // The few densities beside a peak that nearly fills the band are noisy: where they are low by
+    // chance the peak is too broad, and where they are high it is not measured at all.
+    let full_width = reach[0] + reach[1];
+    let is_floor_known = beside as f64 >= LEAST_BESIDE * full_width || *lowest < BARE * peak;
+    let width = if is_floor_known {
+        full_width / FULL_WIDTH
     } else {
         f64::NAN
     };
@@ -360,15 +368,18 @@ fn half_widths(density: &[f64], top: usize, level: f64) -> [f64; 2] {
     ]
 }
 
-/// Mean density away from the peak and from the edges, over which noise of a band leaks out of it; none if the peak fills the band.
-fn mean_beside(density: &[f64], top: usize, reach: [f64; 2]) -> Option<f64> {
+/// Mean density away from the peak and from the edges, over which noise of a band leaks out of it,
+/// and the number of bins there; none if the peak fills the band.
+fn mean_beside(density: &[f64], top: usize, reach: [f64; 2]) -> Option<(f64, usize)> {
     let edge = 0.5 * (reach[0] + reach[1]);
     let (first, last) = (edge as usize, density.len().saturating_sub(edge as usize));
     let low = ((top as f64 - (LOBE * reach[0]).ceil()).max(0.0) as usize).max(first);
     let high = ((top as f64 + (LOBE * reach[1]).ceil()) as usize + 1).min(last);
     let count = low - first + last - high;
-    (count > 0)
-        .then(|| (lanes_sum(&density[first..low]) + lanes_sum(&density[high..last])) / count as f64)
+    (count > 0).then(|| {
+        let sum = lanes_sum(&density[first..low]) + lanes_sum(&density[high..last]);
+        (sum / count as f64, count)
+    })
 }
 
 /// Fractional bin of the peak next to bin `top`, by parabola; `density` begins one bin early.

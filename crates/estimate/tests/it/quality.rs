@@ -79,23 +79,24 @@ fn width_and_snr_are_those_of_the_simulated_wind() {
     }
 }
 
-/// The root of the mean square of the widths that means of 16 windows show, and its standard error; over the true width. None where
-/// some show none.
+/// The root of the mean square of the widths that means of so many windows show, and its standard
+/// error; over the true width. None where some show none.
 fn width_ratio(
     windows: &Windows<f64>,
     statistic: &Correlogram<f64>,
     estimator: &dyn Estimator,
     true_m_s: f64,
+    count: usize,
 ) -> Option<(f64, f64)> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     let (mut scratch, mut one) = (Scratch::new(), vec![0.0; statistic.lags()]);
     let mut draw = || {
         let mut mean = vec![0.0; one.len()];
-        for _ in 0..16 {
+        for _ in 0..count {
             statistic.evaluate(&windows.draw(&mut rng), &mut scratch, &mut one);
             mean.iter_mut()
                 .zip(&one)
-                .for_each(|(sum, value)| *sum += value / 16.0);
+                .for_each(|(sum, value)| *sum += value / count as f64);
         }
         estimator.estimate(&mean, &mut scratch).spread_m2_s2
     };
@@ -170,7 +171,7 @@ fn width_ratios(
     let ratio = |(name, statistic, estimator): (String, Correlogram<f64>, Box<dyn Estimator>)| {
         (
             name,
-            width_ratio(&windows, &statistic, estimator.as_ref(), truth_m_s),
+            width_ratio(&windows, &statistic, estimator.as_ref(), truth_m_s, 16),
         )
     };
     methods_of_widths(n, full_width_s, snr)
@@ -198,14 +199,48 @@ fn each_method_takes_off_what_itself_adds_to_the_width_of_a_spectrum() {
                         "{name} N {n} {full_width_s} {snr}: {ratio} +- {error}"
                     );
                 }
-                // what is wider than a Hann window's peak fills the band with noise beneath
+                // what is wider than the peak of a Hann window or of tapers nearly fills the band
+                // with noise beneath
                 None => {
                     assert!(
-                        n == 32 && matches!(&*name, "Hann" | "pulse pair"),
+                        n == 32 && matches!(&*name, "Hann" | "pulse pair" | "likelihood"),
                         "{name} N {n} {full_width_s} {snr}"
                     )
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn a_peak_that_nearly_fills_the_band_shows_its_width_rightly_or_not_at_all() {
+    // Gaussian windows of 32 samples: the spectrum of a line is 3.0 m/s wide and the band reaches
+    // to 19.4 m/s on either side. From the few bins beside the peak at 3.5 m/s the width would be a
+    // quarter too large.
+    let (n, full_width_s) = (32, 100e-9);
+    let statistic = Correlogram::<f64>::new(Weighting::default(), n).unwrap();
+    let weights = statistic.lag_weights();
+    let refinement = Refinement::Parabola;
+    let kind = SignalKind::Real;
+    let peak = SpectralPeak::new(&table_2(), kind, &weights, 1024, refinement).unwrap();
+    let band = Noise::Band { floor: 1e-6 };
+    let model = WindowModel::gaussian_pulse(&table_2(), n, sigma_s(full_width_s), band).unwrap();
+    for (velocity_m_s, is_shown) in [(3.5, false), (4.0, false), (7.0, true)] {
+        let covariance = model.covariance(velocity_m_s, 1.0, kind).unwrap();
+        let windows = Windows::<f64>::new(&covariance[0]);
+        let found = width_ratio(
+            &windows,
+            &statistic,
+            &peak,
+            pulse_width_m_s(full_width_s),
+            100,
+        );
+        assert_eq!(found.is_some(), is_shown, "{velocity_m_s} m/s: {found:?}");
+        if let Some((ratio, error)) = found {
+            assert!(
+                (ratio - 1.0).abs() < 0.05 + 3.0 * error,
+                "{velocity_m_s} m/s: {ratio} +- {error}"
+            );
         }
     }
 }

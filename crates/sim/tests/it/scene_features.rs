@@ -417,13 +417,13 @@ fn the_ratio_of_every_method_in_every_noise_is_that_of_the_signal() {
         format!("{flat}method.kind = \"first_moment\"\n"),
         "method.kind = \"likelihood\"\n".to_owned(),
     ];
-    for (window, estimator) in [64, 16]
+    for (window, estimator) in [64, 32, 16]
         .iter()
         .flat_map(|window| estimators.iter().map(move |words| (*window, words)))
     {
         // Methods of few lags, and short windows, read the velocity off by some of their resolution, and the gain with it: most of all
         // pairs, which the noise of a band pulls to its middle.
-        let is_coarse = window == 16 || estimator.contains("order");
+        let is_coarse = window < 64 || estimator.contains("order");
         let is_pair = estimator.contains("pulse_pair");
         let of_velocity_db = match (is_coarse, is_pair) {
             (true, true) => 0.9,
