@@ -210,8 +210,9 @@ fn apart(values: &[f64], truth: f64) -> Vec<f64> {
 const NORMAL: [f64; 2] = [0.683, 0.954];
 /// Of cells: with few realisations, the next may have an outlier that these have not (page Files).
 const OF_CELLS: [f64; 2] = [0.6, 0.9];
-/// Of averages of squares: with few outliers, or few cells, those that show none state too little (page Sweeps).
-const OF_SQUARES: [f64; 2] = [0.35, 0.75];
+/// Of averages of squares: with few flagged estimates, or few cells, those without outliers state
+/// too little (page Sweeps).
+const OF_SQUARES: [f64; 2] = [0.35, 0.8];
 /// Of a handful of estimates, which may show none of the outliers of their corner of the map: no share is promised (page Sweeps), their mean square is.
 const OF_A_HANDFUL: [f64; 2] = [0.0, 0.0];
 

@@ -75,6 +75,8 @@ pub struct ScanErrors {
 pub struct ErrorLaw {
     /// Neighbouring lines and gates that share windows.
     pub(crate) shared: [f64; 2],
+    /// Half the width of the band of velocities, m/s.
+    pub(crate) half_band_m_s: f64,
     /// Realisations with an estimate.
     count: Array2<f64>,
     /// Mean error of those that are no outliers, m/s.
@@ -94,9 +96,11 @@ pub struct ErrorLaw {
 }
 
 impl ErrorLaw {
-    /// Of the realisations of a map whose neighbours share windows over so many lines and gates; nothing of fewer than two.
+    /// Of the realisations of a map whose neighbours share windows over so many lines and gates,
+    /// and whose estimates are within a band of that half width, m/s; nothing of fewer than two
+    /// realisations.
     #[must_use]
-    pub fn new(scans: &[ScanErrors], shared: [f64; 2]) -> Option<Self> {
+    pub fn new(scans: &[ScanErrors], shared: [f64; 2], half_band_m_s: f64) -> Option<Self> {
         let shape = scans.get(1)?.error_m_s.dim();
         let n = scans.len() as f64;
         let freedom = n - 1.0;
@@ -174,6 +178,7 @@ impl ErrorLaw {
         let outlier_part = outliers.sum() / count.sum().max(1.0);
         Some(Self {
             shared,
+            half_band_m_s,
             count,
             bias_m_s,
             variance,

@@ -8,6 +8,7 @@ use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
 use crate::scene::DetectorSignal;
 use crate::setup::air::{radial_velocity_m_s, seen_m_s};
+use crate::setup::estimators;
 use crate::setup::progress::Observer;
 use crate::setup::ray_information::range_filter;
 use crate::setup::region::places;
@@ -160,7 +161,9 @@ impl<'p, S: Sample> Mapper<'p, S> {
         map.v_mean_m_s = &map.v_pulse_m_s + &map.bias_m_s;
         map.std_m_s = statistics.mapv(|s| s.std_m_s);
         map.rms_m_s = statistics.mapv(|s| s.rms_m_s);
-        map.law = ErrorLaw::new(&map.scans, shared_cells(plan)?);
+        let (low_m_s, high_m_s) = estimators::sampling(&plan.scene.content)?.velocity_limits_m_s();
+        let half_band_m_s = 0.5 * (high_m_s - low_m_s);
+        map.law = ErrorLaw::new(&map.scans, shared_cells(plan)?, half_band_m_s);
         let unknown = || Array2::from_elem(map.count.dim(), f64::NAN);
         map.standard_error_m_s = map
             .law
