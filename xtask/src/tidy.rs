@@ -20,6 +20,8 @@ use std::sync::LazyLock;
 struct Rules {
     /// Beginnings of paths that only one machine has.
     private: Vec<String>,
+    /// Words that no page, message or help has.
+    not_plain: Vec<String>,
     /// Words that name a physical quantity: a public number of that name ends in its unit.
     quantities: BTreeSet<String>,
     units: Vec<String>,
@@ -85,6 +87,7 @@ pub(crate) fn run() -> Outcome {
     let mut found = Vec::new();
     for file in &files {
         check_private(file, &mut found);
+        check_words(file, &mut found);
         check_units(file, &mut found);
         check_reference(file, &mut found);
     }
@@ -122,6 +125,42 @@ fn tracked_files() -> Result<Vec<String>, Failure> {
     let text = output(&mut list)?;
     let present = text.lines().filter(|path| root().join(path).exists());
     Ok(present.map(str::to_owned).collect())
+}
+
+/// Pages, texts of the program and its help have none of the words that the field does not use.
+fn check_words(file: &SourceFile, found: &mut Vec<String>) {
+    let path = &file.path;
+    let is_program = file.extension() == "rs" && path.contains("/src/") && !is_test_file(path);
+    if !(file.is_page() || is_program && !path.starts_with(OWN)) {
+        return;
+    }
+    for (i, line) in file.text.lines().enumerate() {
+        if line.trim() == "#[cfg(test)]" {
+            return;
+        }
+        // Of a source the texts between quotation marks, and what becomes help.
+        let is_help = path.starts_with("crates/sim/src/cli/") && line.contains("/// ");
+        let text = if is_program && !is_help {
+            let parts: Vec<&str> = line.split('"').skip(1).step_by(2).collect();
+            parts.join("\n")
+        } else {
+            line.to_owned()
+        };
+        for word in &RULES.not_plain {
+            if has_word(&text, word) {
+                found.push(format!("{path}:{}: `{word}` is no plain English", i + 1));
+            }
+        }
+    }
+}
+
+/// Whether a text has a word or some, not as a part of a longer one.
+fn has_word(text: &str, word: &str) -> bool {
+    let is_border = |c: Option<char>| c.is_none_or(|c| !c.is_alphanumeric() && c != '_');
+    text.match_indices(word).any(|(at, _)| {
+        let after = text[at + word.len()..].chars().next();
+        is_border(text[..at].chars().next_back()) && is_border(after)
+    })
 }
 
 /// Public numbers that name a quantity end in its unit.

@@ -61,8 +61,8 @@ class WakescopeError(Exception):
 
     @classmethod
     def _of(cls, text: str) -> WakescopeError:
-        told = json.loads(text)
-        return cls(told["error"], told["problems"])
+        report = json.loads(text)
+        return cls(report["error"], report["problems"])
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (str(self), self.problems)

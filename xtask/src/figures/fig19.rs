@@ -218,7 +218,7 @@ fn operating_curves(cases: &[Case]) -> CurvePlot {
     plot
 }
 
-/// What is found nine times in ten, and what the bound predicts.
+/// What is found with probability 0.9, and what the bound predicts.
 fn smallest_circulations(cases: &[Case]) -> CurvePlot {
     let x = Axis::linear("range [m]");
     let y = Axis::linear("circulation [m²/s]");

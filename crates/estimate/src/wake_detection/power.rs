@@ -150,8 +150,8 @@ impl DetectionTrials<'_> {
         (squares / self.circulation_std_m2_s.len() as f64).sqrt()
     }
 
-    /// The circulation that is found nine times in ten \[m^2/s\]: measured; its standard error, from its scatter between groups of wakes,
-    /// NaN with less than twenty wakes; and as the bound foretells, sigma_Gamma (sqrt(T_c) + 1.28).
+    /// The circulation that is found with probability 0.9 \[m^2/s\]: measured; its standard error, from its scatter between groups of wakes,
+    /// NaN with less than twenty wakes; and as the bound predicts, sigma_Gamma (sqrt(T_c) + 1.28).
     #[must_use]
     pub fn smallest_detectable_m2_s(&self, threshold: f64) -> [f64; 3] {
         let foretold = self.circulation_std_m2_s() * (threshold.max(0.0).sqrt() + NINE_OF_TEN);

@@ -1,4 +1,4 @@
-//! A made-up vortex pair and its map, for the examples. Check: none, it is only to be looked at.
+//! A synthetic vortex pair and its map, for the examples. Check: none, it is only to be looked at.
 #![allow(dead_code, reason = "each example uses a part")]
 
 use ndarray::{Array2, Array3};
@@ -11,7 +11,7 @@ use wakescope_sim::scene::Site;
 pub(crate) fn origin() -> Provenance {
     Provenance {
         program: format!("wakescope {}", env!("CARGO_PKG_VERSION")),
-        scene_toml: "seed = 1\n\n[flow]\nkind = \"made-up pair\"\n".into(),
+        scene_toml: "seed = 1\n\n[flow]\nkind = \"synthetic pair\"\n".into(),
         scene_hash: "none".into(),
         seed: 1,
     }
@@ -44,7 +44,7 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         }));
     }
     let mut map = VelocityMap {
-        title: "made-up vortex pair".into(),
+        title: "synthetic vortex pair".into(),
         rays,
         range_m: (0..gates).map(|g| 300.0 + 5.0 * (g as f64 + 0.5)).collect(),
         sweeps: taus
@@ -137,7 +137,7 @@ pub(crate) fn planes() -> CrossPlanes {
         Array3::from_shape_fn(shape, |(t, z, y)| get(wind(y_m[y], z_m[z], tau[t])))
     };
     CrossPlanes {
-        title: "made-up vortex pair".into(),
+        title: "synthetic vortex pair".into(),
         time_s: tau.iter().map(|t| 16.4 * t).collect(),
         v_m_s: part(|w| w.0),
         w_m_s: part(|w| w.1),

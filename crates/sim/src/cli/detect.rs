@@ -225,9 +225,9 @@ fn told(
             "threshold {threshold:.2} for {rate} false alarms a scan; {law}"
         ));
         let (error, bound) = (power.smallest_error_m2_s, power.circulation_std_m2_s);
-        let by_bound = format!("the bound of {bound:.2} m^2/s foretells {foretold:.1}");
+        let by_bound = format!("from the bound of {bound:.2} m^2/s: {foretold:.1}");
         text.push(format!(
-            "circulation found nine times in ten: {measured:.1} +- {error:.1} m^2/s ({by_bound})"
+            "circulation detected with probability 0.9: {measured:.1} +- {error:.1} m^2/s ({by_bound})"
         ));
     }
 }

@@ -25,7 +25,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// What a program gives to a command that it runs.
 pub struct Host {
-    /// Who is told of the progress and warned; it may stop the run.
+    /// Who receives of the progress and warned; it may stop the run.
     pub observer: Arc<dyn Observer + Send>,
     /// Texts of scenes and cases, by the words that stand for their files.
     pub texts: BTreeMap<PathBuf, String>,
@@ -114,7 +114,7 @@ impl Call {
 
 /// Where commands read and write.
 impl Cli {
-    /// Who is told of the progress: the program that called, else bars, unless quiet was asked for.
+    /// Who is notified of the progress: the program that called, else bars, unless quiet was asked for.
     pub(super) fn observer(&self) -> Arc<dyn Observer + Send> {
         match &self.call {
             Some(call) => call.host.observer.clone(),

@@ -127,7 +127,7 @@ pub struct Power {
     pub found: Vec<FoundShare>,
     /// Those at other rates of some circulations.
     pub roc: Vec<FoundShare>,
-    /// The circulation that is found nine times in ten, m^2/s: measured, and as the bound foretells.
+    /// The circulation that is found with probability 0.9, m^2/s: measured, and as the bound predicts.
     pub smallest_m2_s: (f64, f64),
     /// Standard error of the measured one, m^2/s.
     pub smallest_error_m2_s: f64,

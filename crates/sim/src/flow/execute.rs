@@ -343,7 +343,8 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
         .as_ref()
         .map(|wake| wake.end_tau / setup.tau_per_s);
     let Some(end_s) = case.time.end_s.or(wake_end_s).or(setup.end_s) else {
-        let allowed = "a number in s, e.g. 30.0, is needed for a flow of one's own".into();
+        let allowed =
+            "a number in s, e.g. 30.0, is required for a flow with kind = \"free\"".into();
         let problem = Problem {
             key: "time.end_s".into(),
             value: Problem::ABSENT.into(),

@@ -1,4 +1,4 @@
-//! A flow of one's own: mesh, walls, viscosity and initial field, in SI units.
+//! A user-supplied flow: mesh, walls, viscosity and initial field, in SI units.
 
 use super::setup::{Initial, Setup};
 use crate::Error;
@@ -94,7 +94,7 @@ keys! {
         cross_wind_m_s: f64 = 0.0 => FINITE,
     }
 
-    /// A flow of one's own.
+    /// A user-supplied flow.
     table Free {
         /// Direction x, along the flight.
         x: Axis = Axis::default(),

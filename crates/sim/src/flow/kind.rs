@@ -1,4 +1,4 @@
-//! Which flow a case is: a vortex pair, a wake, a flow of one's own; their limits and their setups.
+//! Which flow a case is: a vortex pair, a wake, a user-supplied flow; their limits and their setups.
 
 use super::free::Free;
 use super::setup::Setup;
