@@ -105,7 +105,7 @@ impl Run<'_> {
             run_time(profile, core_s, self.threads)
         ))?;
         say(&format!(
-            "Report: {}",
+            "The report will be {}",
             self.out.join("index.html").display()
         ))
     }
@@ -190,15 +190,16 @@ fn minutes(time_s: f64) -> String {
     format!("{}:{:02}", whole_s / 60, whole_s % 60)
 }
 
-/// Forecast of the time of a run from the processor time of its figures with the profile quick.
+/// Forecast of the time of a run from the processor time that its figures need with the profile quick.
 fn run_time(profile: Profile, quick_core_s: f64, cores: usize) -> String {
     let wall_s = quick_core_s / cores as f64;
-    let quick = if wall_s < 60.0 {
-        "less than a minute".into()
-    } else {
-        format!("about {:.0} minutes", (wall_s / 60.0).ceil())
+    let time = match profile {
+        _ if quick_core_s == 0.0 => "seconds".into(),
+        Profile::Quick if wall_s < 60.0 => "less than a minute".into(),
+        Profile::Quick => format!("about {:.0} minutes", (wall_s / 60.0).ceil()),
+        Profile::Standard => "tens of minutes".into(),
+        Profile::Full => "a day or more".into(),
     };
-    let time = profile.choose(quick.as_str(), "tens of minutes", "a day or more");
     let plural = if cores == 1 { "" } else { "s" };
     format!("{time} on {cores} core{plural}")
 }
@@ -295,4 +296,55 @@ fn claims_table(claims: &[&Claim]) -> Table {
         .text("kind", column(claims, |c| c.kind().name()))
         .text("source", column(claims, |c| c.source()))
         .text("decided_by", column(claims, |c| &c.decided_by))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run of the first figure with one claim, which fails.
+    fn finished(claim: &str) -> (tempfile::TempDir, Outcome) {
+        let temp = tempfile::tempdir().unwrap();
+        let context = Context {
+            profile: Profile::Quick,
+            seed: 1,
+            stages: temp.path().into(),
+            anew: false,
+            wake: None,
+            analytic: false,
+        };
+        let rendered = Rendered {
+            files: vec![("csv".into(), b"a\n1\n".to_vec())],
+            claims: vec![Claim::exact(claim, "2".into(), false)],
+            ..Rendered::default()
+        };
+        let outcome = finish(temp.path(), &context, &[(&figures::ALL[0], rendered)], 1.0);
+        (temp, outcome)
+    }
+
+    #[test]
+    fn an_own_claim_that_fails_is_an_error_after_the_report() {
+        let (temp, outcome) = finished("F16");
+        assert!(outcome.unwrap_err().to_string().ends_with("F16"));
+        assert!(temp.path().join("index.html").exists());
+        // One of the chapter is a result.
+        assert!(finished("F13").1.is_ok());
+    }
+
+    #[test]
+    fn forecasts_are_in_minutes_of_the_cores_of_the_run() {
+        assert_eq!(
+            [(290.0, 2), (20.0, 1), (0.0, 4)].map(|(core_s, cores)| run_time(
+                Profile::Quick,
+                core_s,
+                cores
+            )),
+            [
+                "about 3 minutes on 2 cores",
+                "less than a minute on 1 core",
+                "seconds on 4 cores"
+            ]
+        );
+        assert_eq!(minutes(125.0), "2:05");
+    }
 }

@@ -81,7 +81,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     panels.push(flows::picture(&by_flow));
     let tables = Table::stack(vec![table(&fits), flows::table(&by_flow)])?;
     let mut out = Rendered::new(&tables, &Figure::stacked(panels), &origin)?;
-    out.values = vec![RADIUS_M.to_string(), scans_of_signals.to_string()];
+    let of_signals = match scans_of_signals {
+        0 => "no".into(),
+        scans => scans.to_string(),
+    };
+    out.values = vec![RADIUS_M.to_string(), of_signals];
     out.claims = claims(&first, bounds[0]);
     out.claims.extend(flows::claims(&by_flow));
     Ok(out)

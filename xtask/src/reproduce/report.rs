@@ -339,9 +339,10 @@ fn checks(claims: &[&Claim]) -> Result<String, Failure> {
         ]);
     }
     let count = Count::new(claims.iter().copied(), Kind::Own);
+    let identities = rows.len() - count.all();
     let header = ["Check", "Verdict", "This run", "Figure"];
     Ok(folded(
-        &format!("{count}"),
+        &format!("{count}; {identities} more of arithmetic, copies and geometry"),
         &table("statements", &header, &rows)?,
         fails,
     ))
