@@ -1,5 +1,5 @@
 //! What else a scan allows beside its best fit, as part of the deviations: other spacings where gates are as long as the pair is wide, and
-//! the other profile of the cores where none is stated.
+//! the other profile of the cores where none is stated. Long gates may show one vortex where there is a pair: then a flag says so.
 //!
 //! Each alternative is a fit of its own, weighed by its likelihood. Long gates show circulation times spacing, so that the least chi-square
 //! lies anywhere along a ridge and its curvature says nothing of the ridge's length; there the wake that is told has the mean spacing of all.
@@ -9,7 +9,7 @@ use ndarray::Array2;
 
 use crate::Measured;
 use crate::error::Error;
-use crate::retrieval::hypotheses::{AS_IT_IS, End, Kind, ROUGH, Stage};
+use crate::retrieval::hypotheses::{AS_IT_IS, End, Kind, ROUGH, Stage, best};
 use crate::retrieval::report::{COMPETES, Chosen, Report};
 use crate::retrieval::{Flag, ScanResult, VortexResult};
 use crate::vortex_fit::damped_newton::Stop;
@@ -19,9 +19,6 @@ use crate::vortex_fit::{Parameter, Vortex, Wake};
 /// Spacings of the pairs behind aircraft in service \[m\]: pi/4 of spans of 20 to 80 m, one as likely as another in its logarithm.
 const SPACINGS_M: (f64, f64) = (16.0, 63.0);
 const SPACINGS: usize = 12;
-/// Other spacings are tried where the deviation of the gate is more than this part of the spacing, or of the typical one \[m\].
-const LONG: f64 = 0.4;
-const TYPICAL_M: f64 = 45.0;
 /// Spacings are others if their logarithms differ by more.
 const APART: f64 = 0.1;
 /// What is so much above the best chi-square, in variances, has no weight; nor has what lies beyond it.
@@ -107,7 +104,15 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
         .vortices
         .iter_mut()
         .for_each(|vortex| widen(vortex, &all));
-    result.set(Flag::Ambiguous, is_ambiguous || result.has(Flag::Ambiguous));
+    let pair = best(report.ends, Kind::Both).filter(|_| end.kind != Kind::Both);
+    let may_be_pair = pair.is_some_and(|pair| {
+        pair.chi2 - end.chi2 < COMPETES * variance
+            && !report.stage.options.gate.resolves(pair.wake.spacing_m())
+    });
+    result.set(
+        Flag::Ambiguous,
+        is_ambiguous || may_be_pair || result.has(Flag::Ambiguous),
+    );
     Ok(result)
 }
 
@@ -117,12 +122,11 @@ fn other_spacings(report: &Report<'_>, end: &End, most: f64) -> Vec<End> {
         Parameter::LeftLateral as usize,
         Parameter::RightLateral as usize,
     ];
-    let gate_m = report.stage.gates.kernel.width_m();
     let spacing_m = end.wake.spacing_m();
     let is_free = |place: &usize| end.groups.iter().any(|group| group == &[*place]);
     if end.kind != Kind::Both
         || !lateral.iter().all(is_free)
-        || gate_m < LONG * spacing_m.min(TYPICAL_M)
+        || report.stage.options.gate.resolves(spacing_m)
     {
         return Vec::new();
     }

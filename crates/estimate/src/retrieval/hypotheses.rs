@@ -14,10 +14,6 @@ use crate::vortex_fit::top::{SAME_SIGMAS, distinct};
 use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{PARAMETERS, Parameter, Vortex, Wake};
 
-/// Pairs of places that fits start from.
-const PAIRS: usize = 3;
-/// Pairs are different if a vortex of one is that far from that of the other \[m\].
-const APART_M: f64 = 12.0;
 /// Where a vortex is that does not exist \[m\] from the other, and the typical core of one without a partner.
 const NOWHERE_M: f64 = 1000.0;
 const LONE_CORE_M: f64 = 2.0;
@@ -154,6 +150,7 @@ impl<'a> Stage<'a> {
             whitening: None,
             loss: options.loss,
             prior: options.core_prior,
+            pair_prior: None,
             counted: 1.0,
         };
         Self {
@@ -208,18 +205,11 @@ impl<'a> Stage<'a> {
     /// Where fits of a scan start.
     pub(crate) fn starts(&self) -> Result<Vec<(Kind, Wake)>, Error> {
         let search = Search::new(&self.map.view(), self.gates.model, &self.gates.kernel)?;
-        let mut pairs = search.pairs();
-        pairs.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-        let near = |a: &Vortex, b: &Vortex| a.away_m(b.place_m()) < APART_M;
-        let same = |a: &Wake, b: &Wake| near(&a.left, &b.left) && near(&a.right, &b.right);
-        let found = distinct(pairs.iter().map(|pair| search.wake(pair)), same)
-            .into_iter()
-            .take(PAIRS);
         let mut starts: Vec<_> = self
             .options
             .start
             .into_iter()
-            .chain(found)
+            .chain(search.wakes())
             .map(|wake| (Kind::Both, wake))
             .collect();
         for (kind, sense) in [(Kind::Left, -1.0), (Kind::Right, 1.0)] {

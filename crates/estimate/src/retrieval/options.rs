@@ -21,7 +21,22 @@ pub enum Gate {
     Kernel(RangeKernel),
 }
 
+/// Gates resolve the vortices of a pair if their standard deviation is less than this part of the spacing, or of the typical one \[m\].
+const SHORT: f64 = 0.4;
+const TYPICAL_M: f64 = 45.0;
+
 impl Gate {
+    /// Whether the weight is so short that a scan tells circulation and spacing of a pair with that spacing \[m\] apart, and a pair from one vortex.
+    #[must_use]
+    pub fn resolves(&self, spacing_m: f64) -> bool {
+        let std_m = match self {
+            Self::Point => 0.0,
+            Self::Gaussian { std_m } => *std_m,
+            Self::Kernel(kernel) => kernel.width_m(),
+        };
+        std_m < SHORT * spacing_m.min(TYPICAL_M)
+    }
+
     /// Refuses a weight that is wider than the scan: it shows nothing of a wake, and has more points than any memory.
     pub(crate) fn validate(&self, range_m: &[f64]) -> Result<(), Error> {
         let Self::Gaussian { std_m } = *self else {

@@ -37,6 +37,7 @@ pub fn with_secondary_vortices(
     let map_options = MapFitOptions {
         free: options.free,
         core_prior: options.core_prior,
+        pair_prior: None,
         loss: options.loss,
         secondary: options.secondary,
         correlated_lines: map.elevation_rad.len(),

@@ -43,6 +43,40 @@ fn long_gates_hide_circulations_but_no_wakes() {
     }
 }
 
+/// Gates of more than 0.7 of the spacing: where chi-square per parameter prefers one vortex, a pair explains the velocities as well.
+#[test]
+fn vortices_in_gates_that_do_not_resolve_a_pair_are_ambiguous() {
+    let mut lone = 0;
+    for (circulation, spacing_m, std_m) in [(90.0, 30.0, 25.0), (80.0, 20.0, 15.0)] {
+        let options = RetrievalOptions {
+            gate: Gate::Gaussian { std_m },
+            core_prior: Some(CorePrior::TYPICAL),
+            ..Default::default()
+        };
+        let core_m = 0.045 * spacing_m;
+        let wake = Wake::from_array(&[
+            circulation,
+            circulation,
+            600.0 - 0.5 * spacing_m,
+            60.0,
+            600.0 + 0.5 * spacing_m,
+            60.0,
+            core_m,
+            core_m,
+            1.0,
+            0.0,
+        ]);
+        for seed in 2..5 {
+            let map = noisy(&wake, &options, (0.05, 0.004, 26), (480.0, 12.0, 21), seed);
+            let found = fit_scan(&map, &options).unwrap();
+            lone += usize::from(found.has(Flag::OneVortex));
+            let is_unambiguous = !found.vortices.is_empty() && !found.has(Flag::Ambiguous);
+            assert!(!is_unambiguous, "{spacing_m} {seed}: {found:?}");
+        }
+    }
+    assert!(lone > 0);
+}
+
 /// Whether the vortices move is told by the scan where it can be, and else by how long it lasts.
 #[test]
 fn standing_vortices_are_taken_for_such_and_moving_ones_in_scans_of_seconds() {

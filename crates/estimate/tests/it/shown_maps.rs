@@ -192,6 +192,8 @@ fn cores_that_shrink_on_the_way_are_fitted_where_it_ends() {
         WakeModel::default(),
         MapFitOptions {
             correlated_lines: 2,
+            // the start is where a fit ends that knows nothing of pairs
+            pair_prior: None,
             ..Default::default()
         },
     );

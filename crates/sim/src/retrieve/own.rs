@@ -90,12 +90,20 @@ impl SceneResponse {
             {
                 Some((telling(pair, is_seen), options))
             }
-            (_, 1) => fits
-                .one(found)
-                .filter(|(one, _)| one.vortices.iter().all(is_certain)),
-            (Ok((pair, options)), _) => {
-                Some((self.of_blind_search(pair, map, &options.model), options))
+            (Ok((pair, options)), _) if self.are_reported(&pair, map, &options.model) => {
+                Some((with_certainty(pair), options))
             }
+            (pair, 1) => {
+                let (mut one, options) = fits.one(found)?;
+                let may_be_pair = pair.is_ok_and(|(pair, _)| {
+                    let is_hidden = |wake: Wake| !options.gate.resolves(wake.spacing_m());
+                    unseen(&pair) == 0 && pair.wake.is_some_and(is_hidden)
+                });
+                one.set(Flag::Ambiguous, may_be_pair || one.has(Flag::Ambiguous));
+                let is_certain = one.vortices.iter().all(is_certain);
+                is_certain.then_some((one, options))
+            }
+            (Ok((pair, options)), _) => Some((without_vortices(pair), options)),
             (Err(wakescope_estimate::Error::NoVortex { statistic, needed }), 0) => {
                 Some((without_wake(found, statistic, needed), options.clone()))
             }
@@ -103,14 +111,8 @@ impl SceneResponse {
         }
     }
 
-    /// A pair that stands out of the wind where means show no vortex: its vortices are reported if both are in view and each circulation
-    /// exceeds its standard error.
-    fn of_blind_search(
-        &self,
-        mut pair: ScanResult,
-        map: &ScanMap,
-        model: &WakeModel,
-    ) -> ScanResult {
+    /// Whether the vortices of a pair are reported where means do not show both: both are in view and each circulation exceeds its standard error.
+    fn are_reported(&self, pair: &ScanResult, map: &ScanMap, model: &WakeModel) -> bool {
         // the outermost gates see half a window beyond their middles
         let half_window_m =
             0.5 * self.scene.estimator.window_samples as f64 * self.scene.sample_spacing_m();
@@ -119,12 +121,7 @@ impl SceneResponse {
         let is_reported = |vortex: &VortexResult| {
             model.sees((&map.elevation_rad, &range_m), vortex.place_m()) && is_likely(vortex)
         };
-        if !pair.vortices.iter().all(is_reported) {
-            return without_vortices(pair);
-        }
-        let are_certain = pair.vortices.iter().all(is_certain);
-        pair.set(Flag::Uncertain, !are_certain);
-        pair
+        pair.vortices.iter().all(is_reported)
     }
 }
 
@@ -242,6 +239,13 @@ fn ends_m(axis_m: &[f64]) -> [f64; 2] {
 /// Whether a circulation exceeds its standard error.
 fn is_likely(vortex: &VortexResult) -> bool {
     vortex.circulation_m2_s.value > vortex.circulation_m2_s.std
+}
+
+/// The result with a flag where a circulation is not certain.
+fn with_certainty(mut pair: ScanResult) -> ScanResult {
+    let are_certain = pair.vortices.iter().all(is_certain);
+    pair.set(Flag::Uncertain, !are_certain);
+    pair
 }
 
 /// The result of a scan in which no pair stands out of the wind by the least statistic that is needed.

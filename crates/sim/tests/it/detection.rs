@@ -303,7 +303,28 @@ fn vortices_found(rows: &[HashMap<String, String>]) -> [usize; 2] {
     [found, within_two]
 }
 
-/// The table of the page From scans to vortices, 40 scans a row, and empty scans without a wake.
+/// Cramer-Rao bound on the circulation of a pair, common to both vortices and with known cores, from the signals of a scan, m^2/s.
+fn circulation_bound_m2_s(text: &str) -> f64 {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.toml"), text).unwrap();
+    let arguments = [
+        "sweep",
+        "s.toml",
+        "--vary",
+        "scan.realisations=2",
+        "--out",
+        "out",
+    ];
+    json(folder.path(), &arguments);
+    let table = rows(&folder.path().join("out/results.csv"));
+    let column = table[0]
+        .iter()
+        .position(|name| name == "circulation_bound_m2_s");
+    table[1][column.unwrap()].parse().unwrap()
+}
+
+/// The table of the page From scans to vortices, 40 scans a row, and empty scans without a wake. Columns: kind, Cramer-Rao bound on the circulation
+/// over its value, pairs found, fraction within two standard errors.
 /// `cargo test --release -p wakescope-sim --test it -- --ignored --nocapture narrow_sectors_of_many_kinds`
 #[test]
 #[ignore = "minutes"]
@@ -354,18 +375,21 @@ fn narrow_sectors_of_many_kinds() {
             .filter(|pair| pair.iter().all(|row| !row["gamma_5_15_m2_s"].is_empty()))
             .count();
         let [found, within_two] = vortices_found(&rows);
+        let bound = circulation_bound_m2_s(&text) / 300.0;
         println!(
-            "| {name} | {pairs} | {:.2} |",
+            "| {name} | {bound:.3} | {pairs} | {:.2} |",
             within_two as f64 / found as f64
         );
+        // a bound above a third of the circulation would excuse a pair that is missed
+        assert!(bound < 1.0 / 3.0, "{name}: {bound}");
         assert!(
-            pairs >= 25 && 4 * within_two >= 3 * found,
+            pairs >= 35 && 5 * within_two >= 4 * found,
             "{name}: {pairs}"
         );
         all = [all[0] + found, all[1] + within_two];
     }
     println!("all: {:.3} of {}", all[1] as f64 / all[0] as f64, all[0]);
-    assert!(100 * all[1] >= 87 * all[0]);
+    assert!(10 * all[1] >= 9 * all[0]);
     let empty = scene
         .replace("circulation_m2_s = 300.0", "circulation_m2_s = 0.01")
         .replace("realisations = 40", "realisations = 150");

@@ -5,7 +5,7 @@
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, finite, increasing, length, positive};
-use crate::vortex_fit::{CorePrior, FreeParameters, Parameter, Top, Wake};
+use crate::vortex_fit::{CorePrior, FreeParameters, PairPrior, Parameter, Top, Wake};
 
 /// A map of radial velocities, such as accumulation gives.
 #[derive(Debug, Clone, Copy)]
@@ -169,6 +169,8 @@ pub struct MapFitOptions {
     pub core_radius_m: Option<f64>,
     /// What is known of the core radii that may change.
     pub core_prior: Option<CorePrior>,
+    /// Prior of the spacing and the circulations of a pair.
+    pub pair_prior: Option<PairPrior>,
     /// What residuals cost.
     pub loss: Loss,
     /// Whether secondary vortices are fitted.
@@ -180,13 +182,14 @@ pub struct MapFitOptions {
 }
 
 impl Default for MapFitOptions {
-    /// All parameters, core radii as they typically are, the loss of Cauchy, 8 correlated lines; a statistic above those of empty scans (the ignored test
+    /// All parameters, core radii as they typically are, pairs as aircraft have them, the loss of Cauchy, 8 correlated lines; a statistic above those of empty scans (the ignored test
     /// `narrow_sectors_of_many_kinds` of the program).
     fn default() -> Self {
         Self {
             free: FreeParameters::default(),
             core_radius_m: None,
             core_prior: Some(CorePrior::TYPICAL),
+            pair_prior: Some(PairPrior::AIRCRAFT),
             loss: Loss::Cauchy { width: 2.385 },
             secondary: Secondary::Auto,
             least_statistic: 35.0,

@@ -12,14 +12,15 @@ use crate::vortex_fit::damped_newton::Stop;
 use crate::vortex_fit::map_fit::coarse::Coarse;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
 use crate::vortex_fit::map_fit::gates::Gates;
-use crate::vortex_fit::map_fit::guess::first_guess;
+use crate::vortex_fit::map_fit::guess::first_guesses;
 use crate::vortex_fit::map_fit::local_circulation::{REACH_M, joined};
-use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, quotients};
+use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, near, quotients};
 use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::map_fit::starts::{best_of, rivals, starts, with_typical_core};
+use crate::vortex_fit::top::distinct;
 use crate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, SecondaryVortices,
-    Sharing, VelocityMap, Wake, WakeModel,
+    Sharing, VelocityMap, Vortex, Wake, WakeModel,
 };
 
 /// The least core radius over a region's radius, or over the distance of lines.
@@ -64,7 +65,7 @@ pub fn fit_map(
     kernel: &RangeKernel,
     options: &MapFitOptions,
 ) -> Result<MapFit, Error> {
-    let guess = first_guess(map, model, kernel, options.least_statistic)?;
+    let guess = &first_guesses(map, model, kernel, options.least_statistic)?[0];
     let gates = Gates::at_rest(model, kernel.clone(), (map.elevation_rad, map.range_m));
     let setting = Setting {
         map,
@@ -75,7 +76,7 @@ pub fn fit_map(
         least_core_m: 0.0,
     };
     let refine = |start: &Wake| setting.descended(start, FINE_SIGMAS);
-    with_typical_core(best_of(&starts(&guess, options), refine)?, options, refine)?
+    with_typical_core(best_of(&starts(guess, options), refine)?, options, refine)?
         .standing_out(options.least_statistic)
 }
 
@@ -93,37 +94,17 @@ pub fn fit_map_of_estimator(
 ) -> Result<MapFit, Error> {
     map.validate()?;
     let all = Shown::new(map, model, response, options, 1.0)?;
-    let guess = first_guess(map, model, &all.prepared.kernel, options.least_statistic)?;
+    let guesses = first_guesses(map, model, &all.prepared.kernel, options.least_statistic)?;
     let coarse = all.coarse(LINES_OVER_RADIUS[0]);
     let few = coarse.as_ref().map(|coarse| all.at(coarse)).transpose()?;
-    // taken for means, peaks mislead above all the core radius, and may lead nowhere: then the guess is the start
-    let rough = MapFitOptions {
-        free: FreeParameters {
-            core_radius: Sharing::Fixed,
-            ..options.free
-        },
-        ..*options
-    };
-    let by_means = |map: &VelocityMap<'_>, kernel: &RangeKernel| {
-        let gates = Gates::at_rest(model, kernel.clone(), (map.elevation_rad, map.range_m));
-        let setting = Setting {
-            map,
-            model,
-            prediction: &gates,
-            kernel,
-            options: &rough,
-            least_core_m: 0.0,
-        };
-        setting.descended(&guess, ROUGH_SIGMAS)
-    };
-    let by_means = match &few {
-        Some(few) => by_means(&few.map, &few.prepared.kernel),
-        None => by_means(map, &all.prepared.kernel.coarser(2)),
+    let about = match &few {
+        Some(few) => few.ends_of_means(&guesses, &few.prepared.kernel),
+        None => all.ends_of_means(&guesses, &all.prepared.kernel.coarser(2)),
     };
     let for_slopes = all.coarse(LINES_OVER_RADIUS[1]);
     let all = all.with_slopes_at(for_slopes.as_ref())?;
     let refine = |start: &Wake| all.setting().refined(start, NEAR);
-    let from = |about: &[&Wake]| {
+    let from = |about: &[Wake]| {
         let starts: Vec<Wake> = about
             .iter()
             .flat_map(|about| starts(about, options))
@@ -136,20 +117,9 @@ pub fn fit_map_of_estimator(
         };
         best_of(if ends.is_empty() { &starts } else { &ends }, refine)
     };
-    let sector = (map.elevation_rad, map.range_m);
-    let fit = match by_means.as_ref().map(|fit| &fit.wake) {
-        // a vortex that left the map on the way may have been in it
-        Ok(end)
-            if !(model.sees(sector, end.left.place_m())
-                && model.sees(sector, end.right.place_m())) =>
-        {
-            from(&[end, &guess])
-        }
-        Ok(end) => match from(&[end]) {
-            Err(Error::NotConverged { .. }) => from(&[&guess]),
-            first => first,
-        },
-        Err(_) => from(&[&guess]),
+    let fit = match from(&about) {
+        Err(Error::NotConverged { .. }) => from(&guesses),
+        first => first,
     };
     with_typical_core(fit?, options, refine)?.standing_out(options.least_statistic)
 }
@@ -327,6 +297,40 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
             options,
             least_core_m: *least_core_m,
         }
+    }
+
+    /// Where fits of means over `kernel` end from some guesses, each with its guess where a vortex left the map on the way, or the guess alone where
+    /// the fit comes to no end: taken for means, peaks mislead above all the core radius, which stays as it is, and may lead nowhere.
+    fn ends_of_means(&self, guesses: &[Wake], kernel: &RangeKernel) -> Vec<Wake> {
+        let model = self.prepared.model;
+        let sector = (self.map.elevation_rad, self.map.range_m);
+        let gates = Gates::at_rest(model, kernel.clone(), sector);
+        let options = MapFitOptions {
+            free: FreeParameters {
+                core_radius: Sharing::Fixed,
+                ..self.options.free
+            },
+            ..self.options
+        };
+        let setting = Setting {
+            map: &self.map,
+            model,
+            prediction: &gates,
+            kernel,
+            options: &options,
+            least_core_m: 0.0,
+        };
+        let mut ends = Vec::new();
+        for guess in guesses {
+            let end = setting.descended(guess, ROUGH_SIGMAS).ok();
+            let end = end.map(|fit| fit.wake);
+            ends.extend(end);
+            let is_in_map = |vortex: &Vortex| model.sees(sector, vortex.place_m());
+            if !end.is_some_and(|end| is_in_map(&end.left) && is_in_map(&end.right)) {
+                ends.push(*guess);
+            }
+        }
+        distinct(ends, |a, b| near(&a.to_array(), &b.to_array()))
     }
 
     /// Where the fits from some starts end that do, without those that are one.

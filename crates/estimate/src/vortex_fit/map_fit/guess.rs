@@ -12,6 +12,7 @@ use crate::parallel::{map_each, map_indexed};
 use crate::vortex_fit::map_fit::cells::{orthonormal, remove, scaled};
 use crate::vortex_fit::map_fit::data::{block_means, ends, median};
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
+use crate::vortex_fit::top::distinct;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
 use crate::vortex_fit::{RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
@@ -22,6 +23,10 @@ const BLOCKS: usize = 48;
 const PLACES: usize = 26;
 /// Vortices are no closer \[m\].
 const CLOSEST_M: f64 = 2.0;
+/// Pairs of places that fits start from.
+const PAIRS: usize = 3;
+/// Pairs are different if a vortex of one is that far from that of the other \[m\].
+const APART_M: f64 = 12.0;
 /// Velocities that a search needs.
 const NEEDED: usize = 100;
 
@@ -68,9 +73,9 @@ fn thin(map: &VelocityMap<'_>) -> Thinned {
 
 /// A pair of places with the circulations that fit best there.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Pair {
+struct Pair {
     /// Sum of squares that it explains.
-    pub(crate) explained: f64,
+    explained: f64,
     left: usize,
     right: usize,
     strength: (f64, f64),
@@ -85,31 +90,25 @@ pub(crate) struct Search {
     towards: Array1<f64>,
 }
 
-/// The best pair of vortices on a grid of places.
+/// Wakes of the best pairs of vortices on a grid of places, the best first.
 ///
 /// # Errors
 /// [`Error::TooFewVelocities`] with less than a hundred velocities, [`Error::NoVortex`] with the statistic `needed` if no pair has the sense of an
 /// aircraft's.
-pub(crate) fn first_guess(
+pub(crate) fn first_guesses(
     map: &VelocityMap<'_>,
     model: &WakeModel,
     kernel: &RangeKernel,
     needed: f64,
-) -> Result<Wake, Error> {
-    let search = Search::new(map, model, kernel)?;
-    // the first of equals, whoever computed it
-    let best = search.pairs().into_iter().reduce(|most, next| {
-        if next.explained > most.explained {
-            next
-        } else {
-            most
-        }
-    });
-    let nothing = Error::NoVortex {
-        statistic: 0.0,
-        needed,
-    };
-    best.map(|best| search.wake(&best)).ok_or(nothing)
+) -> Result<Vec<Wake>, Error> {
+    let wakes = Search::new(map, model, kernel)?.wakes();
+    if wakes.is_empty() {
+        return Err(Error::NoVortex {
+            statistic: 0.0,
+            needed,
+        });
+    }
+    Ok(wakes)
 }
 
 impl Search {
@@ -142,8 +141,19 @@ impl Search {
         })
     }
 
+    /// Wakes of the best pairs with different places, the best first.
+    pub(crate) fn wakes(&self) -> Vec<Wake> {
+        let mut pairs = self.pairs();
+        pairs.sort_by(|a, b| b.explained.total_cmp(&a.explained));
+        let is_near = |a: &Vortex, b: &Vortex| a.away_m(b.place_m()) < APART_M;
+        let is_same = |a: &Wake, b: &Wake| is_near(&a.left, &b.left) && is_near(&a.right, &b.right);
+        let mut wakes = distinct(pairs.iter().map(|pair| self.wake(pair)), is_same);
+        wakes.truncate(PAIRS);
+        wakes
+    }
+
     /// The wake of a pair, without wind.
-    pub(crate) fn wake(&self, pair: &Pair) -> Wake {
+    fn wake(&self, pair: &Pair) -> Wake {
         let (left, right) = (self.places_m[pair.left], self.places_m[pair.right]);
         let core_m = CORE_OVER_SPACING * (right.0 - left.0);
         Wake::calm(
@@ -153,7 +163,7 @@ impl Search {
     }
 
     /// For each place of a left vortex the best one of a right vortex with positive circulations of both.
-    pub(crate) fn pairs(&self) -> Vec<Pair> {
+    fn pairs(&self) -> Vec<Pair> {
         let best = |left: usize| {
             // a clockwise vortex shows the opposite shape
             let (a, aa) = (-self.towards[left], self.gram[[left, left]]);

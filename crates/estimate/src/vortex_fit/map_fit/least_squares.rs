@@ -21,7 +21,7 @@ use crate::vortex_fit::map_fit::prediction::Prediction;
 use crate::vortex_fit::map_fit::residual_covariance::{Cells, decaying, of_neighbours};
 use crate::vortex_fit::wake::core_prior::secondary_terms;
 use crate::vortex_fit::wake::free_parameters::{spread, stepped};
-use crate::vortex_fit::{CorePrior, Loss, PARAMETERS, Wake};
+use crate::vortex_fit::{CorePrior, Loss, PARAMETERS, PairPrior, Wake};
 
 /// Expected velocities, those that were measured, and what distances between them cost.
 #[derive(Clone)]
@@ -34,6 +34,7 @@ pub(crate) struct LeastSquares<'a> {
     pub(crate) whitening: Option<&'a Whitening>,
     pub(crate) loss: Loss,
     pub(crate) prior: Option<CorePrior>,
+    pub(crate) pair_prior: Option<PairPrior>,
     /// Velocities that count as one: as the losses of all of them are added up, so many times what is known before must count.
     pub(crate) counted: f64,
 }
@@ -110,6 +111,9 @@ impl LeastSquares<'_> {
         let mut known = self
             .prior
             .map_or_else(Vec::new, |prior| prior.terms(&Wake::from_list(at), groups));
+        if let Some(prior) = self.pair_prior {
+            known.extend(prior.terms(&Wake::from_list(at), groups));
+        }
         if at.len() > PARAMETERS {
             known.extend(secondary_terms(at, groups));
         }

@@ -17,7 +17,8 @@ use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Scores};
 use crate::vortex_fit::map_fit::prediction::{Prediction, Tangent, near};
 use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{
-    CorePrior, MapFit, MapFitOptions, Parameter, RangeKernel, Top, VelocityMap, Wake, WakeModel,
+    CorePrior, MapFit, MapFitOptions, PairPrior, Parameter, RangeKernel, Top, VelocityMap, Wake,
+    WakeModel,
 };
 
 /// Most evaluations in a descent, and the step that is left at its end \[standard deviations\].
@@ -74,6 +75,10 @@ impl Setting<'_, '_> {
             .core_prior
             .as_ref()
             .map_or(Ok(()), CorePrior::validate)?;
+        self.options
+            .pair_prior
+            .as_ref()
+            .map_or(Ok(()), PairPrior::validate)?;
         let groups = self.options.free.groups_of(start);
         enough_velocities(found, 10 * groups.len().max(1))?;
         Ok(groups)
@@ -88,6 +93,7 @@ impl Setting<'_, '_> {
             whitening: None,
             loss,
             prior,
+            pair_prior: self.options.pair_prior,
             counted: 1.0,
         }
     }
@@ -310,6 +316,7 @@ impl Setting<'_, '_> {
         let calm = LeastSquares {
             prediction: &middle,
             prior: None,
+            pair_prior: None,
             ..squares.clone()
         }
         .minimum(&calm, &wind, DESCENT);

@@ -1,7 +1,7 @@
 //! Where fits of maps begin, and which of their ends is taken.
 //!
 //! Core radii are tried small and large; what they end at is compared by the likelihood that the loss stands for. Ends that are
-//! not the best add their distance to the covariance, weighted with their likelihood. Check: made-up ends; fits of many maps.
+//! not the best but compete with it add their distance to the covariance, weighted with their likelihood. Check: made-up ends; fits of many maps.
 
 use crate::error::Error;
 use crate::vortex_fit::map_fit::prediction::LONE_M;
@@ -19,6 +19,8 @@ const TYPICAL: f64 = 0.05;
 const ROUNDS: usize = 3;
 /// Ends of rough fits that are closer lead to one.
 const ONE_SIGMAS: f64 = 1.0;
+/// Ends with a chi-square so much above the best one's are no part of its covariance.
+const COMPETES: f64 = 9.0;
 /// Ends with a chi-square so much above the best one's weigh less than a ten thousandth beside it.
 const HOPELESS: f64 = 20.0;
 
@@ -139,7 +141,9 @@ fn merged(mut ends: Vec<MapFit>) -> Option<MapFit> {
     let (best, others) = ends.split_first()?;
     let others = others.iter().filter(|end| !same(best, end, SAME_SIGMAS));
     let all: Vec<&MapFit> = std::iter::once(best).chain(others).collect();
-    let weighted = all.iter().map(|end| {
+    // the covariance of an unlikely end may be beyond all bounds: weighed with its likelihood it would still hide what the best one shows
+    let likely = all.iter().filter(|end| chi2(end) - chi2(best) < COMPETES);
+    let weighted = likely.map(|end| {
         (
             (0.5 * (chi2(best) - chi2(end))).exp(),
             &end.wake,

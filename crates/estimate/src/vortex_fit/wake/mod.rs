@@ -5,6 +5,7 @@ pub(crate) mod free_parameters;
 pub(crate) mod mean_circulation;
 pub(crate) mod motion;
 pub(crate) mod pair;
+pub(crate) mod pair_prior;
 pub(crate) mod pulse;
 pub(crate) mod range_kernel;
 pub(crate) mod rolling_moment;
