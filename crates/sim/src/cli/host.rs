@@ -25,7 +25,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// What a program gives to a command that it runs.
 pub struct Host {
-    /// Who receives of the progress and warned; it may stop the run.
+    /// Who is notified of progress and warnings; it may stop the run.
     pub observer: Arc<dyn Observer + Send>,
     /// Texts of scenes and cases, by the words that stand for their files.
     pub texts: BTreeMap<PathBuf, String>,

@@ -188,7 +188,7 @@ pub(crate) fn encode(
     let mut encoder = png::Encoder::new(&mut bytes, size.0, size.1);
     encoder.set_color(png::ColorType::Rgba);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Best);
+    encoder.set_compression(png::Compression::Balanced);
     if count > 1 {
         encoder.set_animated(count as u32, 0).map_err(refuse)?;
         encoder
@@ -295,7 +295,9 @@ mod tests {
         let png_bytes = || encode([paint(&drawing)], 0.0, Some(&example())).unwrap();
         let bytes = png_bytes();
         assert_eq!(bytes, png_bytes());
-        let reader = png::Decoder::new(bytes.as_slice()).read_info().unwrap();
+        let reader = png::Decoder::new(std::io::Cursor::new(&bytes))
+            .read_info()
+            .unwrap();
         let chunks: Vec<(String, String)> = reader
             .info()
             .utf8_text
@@ -332,7 +334,9 @@ mod tests {
             &example(),
         )
         .unwrap();
-        let mut reader = png::Decoder::new(bytes.as_slice()).read_info().unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes))
+            .read_info()
+            .unwrap();
         assert_eq!(reader.info().animation_control.unwrap().num_frames, 3);
         let mut pixels = vec![0; 4 * reader.info().width as usize * reader.info().height as usize];
         let mut sums = Vec::new();
