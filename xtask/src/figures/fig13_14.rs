@@ -32,7 +32,7 @@ pub(super) fn make_13(context: &Context) -> Result<Rendered, Failure> {
 pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
     let scans = context
         .profile
-        .choose([[8; 2], [32; 2]], [[32; 2], [192; 2]], [[96; 2], [400; 2]]);
+        .choose([[8; 2], [24; 2]], [[32; 2], [192; 2]], [[96; 2], [400; 2]]);
     let (mut out, chapter) = compare(context, DURATIONS_S.len(), scans, |scene| {
         with_turbulence(context, scene, 1e-15)
     })?;

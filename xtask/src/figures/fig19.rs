@@ -77,7 +77,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     );
     let step_m = context.profile.choose(1.0, 0.5, 0.5);
     // Few scans tell a high rate alone.
-    let (scans, rate) = context.profile.choose((12, 0.3), (300, 0.1), (1000, 0.1));
+    let (scans, rate) = context.profile.choose((8, 0.3), (300, 0.1), (1000, 0.1));
     let mut cases = Vec::new();
     let mut alarmed = None;
     for &range_m in &ranges_m {

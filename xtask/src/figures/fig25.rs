@@ -66,7 +66,7 @@ fn at(setting: Case, snr_db: f64) -> Case {
 
 fn cases(context: &Context) -> Vec<Case> {
     let levels_db = context.profile.choose(
-        vec![WEAK_DB, CHAPTER_DB, 10.0, STRONG_DB],
+        vec![WEAK_DB, CHAPTER_DB, STRONG_DB],
         vec![WEAK_DB, -5.0, CHAPTER_DB, 5.0, 10.0, 15.0, STRONG_DB],
         vec![
             WEAK_DB, -7.5, -5.0, -2.5, CHAPTER_DB, 5.0, 10.0, 15.0, STRONG_DB,

@@ -92,9 +92,14 @@ pub(super) fn growth() -> Result<Vec<Panel>, Failure> {
 
 /// The largest Courant number, to a thousandth, at which a step is not refused and no wave grows, against the root of the scheme. Waves of all lengths
 /// start alike.
-pub(super) fn limits() -> Result<Vec<Panel>, Failure> {
+pub(super) fn limits(profile: Profile) -> Result<Vec<Panel>, Failure> {
     let curves = SCHEMES.map(|(name, scheme)| {
-        Curve::new(name, &[1e-3, 1e-2, 3e-2, 1e-1, 3e-1], |viscous| {
+        let viscous = thinned(
+            profile,
+            &[1e-3, 3e-2, 3e-1],
+            &[1e-3, 1e-2, 3e-2, 1e-1, 3e-1],
+        );
+        Curve::new(name, viscous, |viscous| {
             let mut low = 0.05;
             let mut high = 2.0;
             while high - low > 5e-4 * low {

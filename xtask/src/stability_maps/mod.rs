@@ -97,7 +97,7 @@ type Measurement<'m> = &'m (dyn Fn() -> Result<Vec<Panel>, Failure> + Sync);
 pub(crate) fn measure(profile: Profile) -> Result<Vec<Panel>, Failure> {
     let panels: [Measurement; 13] = [
         &flow::growth,
-        &flow::limits,
+        &|| flow::limits(profile),
         &flow::stiff,
         &|| flow::pressure(profile),
         &flow::drift,
