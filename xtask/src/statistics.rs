@@ -35,7 +35,7 @@ impl Verdict {
 }
 
 /// A number with its standard error and the degrees of freedom of that.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Estimate {
     pub(crate) value: f64,
     pub(crate) standard_error: f64,

@@ -8,7 +8,7 @@ use wakescope_sim::io::{FileGroup, Provenance};
 // What figures are made of.
 pub(super) use crate::claim::{Claim, Part};
 pub(super) use crate::profile::Profile;
-pub(super) use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE, Verdict};
+pub(super) use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE};
 pub(super) use fixtures::failure::Failure;
 pub(super) use ndarray::Array2;
 pub(super) use wakescope_les::analysis::decay::value_at;
@@ -80,34 +80,9 @@ pub(crate) struct Comparison {
     pub(crate) pulse: String,
     /// The periodogram accumulation.
     pub(crate) against: String,
-    pub(crate) inside: Difference,
-    pub(crate) outside: Difference,
-}
-
-/// A relative difference of two errors.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Difference {
-    /// The value with its 95 % interval, in print.
-    pub(crate) interval: String,
-    /// Whether it is below zero.
-    pub(crate) verdict: Verdict,
-}
-
-impl Difference {
-    /// From a fraction.
-    pub(super) fn new(fraction: Estimate) -> Self {
-        let percent = fraction.times(100.0);
-        let half = percent.half_width();
-        Self {
-            interval: format!(
-                "{:+.0} % ({:+.0} to {:+.0})",
-                percent.value,
-                percent.value - half,
-                percent.value + half
-            ),
-            verdict: Bar::Less(NO_DIFFERENCE).verdict(&fraction),
-        }
-    }
+    /// The error of correlogram accumulation over that of periodogram accumulation, less one.
+    pub(crate) inside: Estimate,
+    pub(crate) outside: Estimate,
 }
 
 /// What a figure gives.

@@ -229,8 +229,8 @@ pub(super) fn comparison(all: &[Profiles]) -> Vec<Comparison> {
                     "PA" => "unweighted".into(),
                     _ => "Gaussian weighting".into(),
                 },
-                inside: Difference::new(ca.inside.over(&pa.inside)),
-                outside: Difference::new(ca.outside.over(&pa.outside)),
+                inside: ca.inside.over(&pa.inside),
+                outside: ca.outside.over(&pa.outside),
             });
         }
     }

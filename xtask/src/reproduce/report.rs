@@ -10,8 +10,8 @@ use crate::cost::machine;
 use crate::figures::context::{Context, Rendered};
 use crate::figures::{Figure, filled};
 use crate::profile::Profile;
-use crate::statistics::Verdict;
-use elements::{Picture, badge, folded, table, table_of_csv, thumbnail_of_csv, typeset};
+use crate::statistics::{Bar, Estimate, NO_DIFFERENCE, Verdict};
+use elements::{Picture, badge, folded, table, typeset};
 use fixtures::failure::Failure;
 use std::fmt;
 use wakescope_sim::plot::escape;
@@ -117,22 +117,14 @@ fn numbers(figures: usize, claims: &[&Claim], run_s: f64) -> String {
     list
 }
 
-/// What the picture of a figure, or the rows of a table, are made of.
-enum Shown<'r> {
-    Picture(Picture<'r>),
-    Rows(std::borrow::Cow<'r, str>),
-}
-
 /// The picture of a figure; its table where it has none.
-fn shown<'r>(figure: &Figure, rendered: &'r Rendered) -> Result<Shown<'r>, Failure> {
+fn picture<'r>(figure: &Figure, rendered: &'r Rendered) -> Result<Picture<'r>, Failure> {
     match rendered.file("svg") {
-        Some(svg) => Ok(Shown::Picture(Picture::new(
-            figure.id,
-            std::str::from_utf8(svg)?,
-        )?)),
-        None => Ok(Shown::Rows(String::from_utf8_lossy(
-            rendered.file("csv").unwrap_or_default(),
-        ))),
+        Some(svg) => Picture::new(figure.id, std::str::from_utf8(svg)?),
+        None => Ok(Picture::Rows {
+            id: figure.id,
+            csv: String::from_utf8_lossy(rendered.file("csv").unwrap_or_default()),
+        }),
     }
 }
 
@@ -140,10 +132,7 @@ fn shown<'r>(figure: &Figure, rendered: &'r Rendered) -> Result<Shown<'r>, Failu
 fn thumbnails(done: &Done<'_>) -> Result<String, Failure> {
     let mut list = String::new();
     for (figure, rendered) in done {
-        let small = match shown(figure, rendered)? {
-            Shown::Picture(picture) => picture.thumbnail(),
-            Shown::Rows(csv) => thumbnail_of_csv(&csv),
-        };
+        let small = picture(figure, rendered)?.thumbnail();
         let id = figure.id;
         let number = escape(&figure.numbered());
         let title = typeset(figure.title);
@@ -174,10 +163,7 @@ fn figures(done: &Done<'_>) -> Result<String, Failure> {
             marks += &format!(" <span class=\"mark\">{}</span>", escape(mark));
         }
         let heading = figure.heading();
-        let content = match shown(figure, rendered)? {
-            Shown::Picture(picture) => picture.full(&heading),
-            Shown::Rows(csv) => table_of_csv(id, &csv)?,
-        };
+        let content = picture(figure, rendered)?.full(&heading)?;
         figures += &format!(
             "<figure id=\"{id}\">\n<h3>{}{marks}</h3>\n{content}<figcaption>{}</figcaption>\n</figure>\n",
             typeset(&heading),
@@ -201,16 +187,16 @@ fn comparison(done: &Done<'_>) -> Result<String, Failure> {
     for case in &rendered.comparison {
         let mut row = vec![typeset(&case.pulse), typeset(&case.against)];
         for region in [&case.inside, &case.outside] {
-            let class = region.verdict.name();
-            let word = match region.verdict {
+            let verdict = Bar::Less(NO_DIFFERENCE).verdict(region);
+            let word = match verdict {
                 Verdict::Pass => "yes",
                 Verdict::Fail => "no",
                 Verdict::Open => "open",
             };
             row.push(format!(
                 "<span class=\"value\">{}</span> {}",
-                typeset(&region.interval),
-                badge(class, word)
+                typeset(&interval_percent(region)),
+                badge(verdict.name(), word)
             ));
         }
         rows.push(row);
@@ -223,6 +209,18 @@ fn comparison(done: &Done<'_>) -> Result<String, Failure> {
         figure.id,
         figure.numbered()
     ))
+}
+
+/// A fraction in percent with its 95 % interval.
+fn interval_percent(fraction: &Estimate) -> String {
+    let percent = fraction.times(100.0);
+    let half = percent.half_width();
+    format!(
+        "{:+.0} % ({:+.0} to {:+.0})",
+        percent.value,
+        percent.value - half,
+        percent.value + half
+    )
 }
 
 /// The word for a verdict on a statement of the chapter.
@@ -393,7 +391,7 @@ fn origin(context: &Context) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figures::context::{Comparison, Difference};
+    use crate::figures::context::Comparison;
     use crate::profile::Profile;
 
     const WILD: &str = "<script>alert('x & \"y\"')</script>";
@@ -415,14 +413,11 @@ mod tests {
             figure: WILD.into(),
             ..Claim::exact(id, WILD.into(), false).open(WILD)
         };
-        let difference = Difference {
-            interval: WILD.into(),
-            verdict: Verdict::Open,
-        };
+        let difference = Estimate::mean(&[0.0, 0.1]);
         let comparison = Comparison {
             pulse: WILD.into(),
             against: WILD.into(),
-            inside: difference.clone(),
+            inside: difference,
             outside: difference,
         };
         let rendered = |extension: &str, bytes: &str| Rendered {

@@ -54,12 +54,13 @@ impl Autoregression {
         positive("lag 0 of the correlogram", self.noise_power)?;
         match kind {
             SignalKind::Real => {
-                let found = reflect(correlogram, order, work).map_err(unstable)?;
+                let (coefficients, reflection, noise_power) =
+                    reflect(correlogram, order, work).map_err(unstable)?;
                 self.coefficients
-                    .extend(found.coefficients.iter().map(|a| Complex::from(*a)));
+                    .extend(coefficients.iter().map(|a| Complex::from(*a)));
                 self.reflection
-                    .extend(found.reflection.iter().map(|k| Complex::from(*k)));
-                self.noise_power = found.noise_power;
+                    .extend(reflection.iter().map(|k| Complex::from(*k)));
+                self.noise_power = noise_power;
             }
             SignalKind::Complex => {
                 for m in 1..=order {

@@ -4,24 +4,15 @@
 //! for a sum; the coefficients follow from the reflections by Levinson's update. Check: the complex Levinson
 //! recursion in `autoregressive`, the Yule-Walker equations, and a stored window.
 
-/// Solution of the Yule-Walker equations of a real correlogram.
-pub(crate) struct Reflected<'w> {
-    /// a_1 .. a_p.
-    pub(crate) coefficients: &'w [f64],
-    /// k_1 .. k_p.
-    pub(crate) reflection: &'w [f64],
-    /// Prediction error of the last order.
-    pub(crate) noise_power: f64,
-}
-
-/// Model of order `order` of a correlogram with more lags than that, lag 0 above 0; `work` grows to 4 p numbers.
+/// Solves the Yule-Walker equations of order `order` for a correlogram with more lags than that, lag 0 above 0; `work` grows to 4 p numbers.
+/// Returns the coefficients a_1 .. a_p, the reflection coefficients k_1 .. k_p and the prediction error of the last order.
 ///
 /// A reflection coefficient on or outside the unit circle stops the recursion; its size is the error.
 pub(crate) fn reflect<'w>(
     correlogram: &[f64],
     order: usize,
     work: &'w mut Vec<f64>,
-) -> Result<Reflected<'w>, f64> {
+) -> Result<(&'w [f64], &'w [f64], f64), f64> {
     work.clear();
     work.extend_from_slice(&correlogram[1..=order]);
     work.extend_from_slice(&correlogram[..order]);
@@ -42,11 +33,7 @@ pub(crate) fn reflect<'w>(
         }
         step_up(&mut coefficients[..=stage], k);
     }
-    Ok(Reflected {
-        coefficients,
-        reflection,
-        noise_power: behind[0],
-    })
+    Ok((coefficients, reflection, behind[0]))
 }
 
 /// Levinson's update of the coefficients by one order; the last place is new.

@@ -8,7 +8,7 @@ use crate::io::raw::{RawFormat, RawRecords};
 use crate::io::scans::{self, ReadScan, ScanFormat};
 use crate::io::{Existing, Provenance};
 use crate::measure::recorded::{
-    self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape,
+    self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra,
 };
 use crate::outputs::{List, Outputs};
 use crate::plan::Plan;
@@ -156,8 +156,7 @@ impl ScanArgs {
                 reason,
             });
         };
-        let mut records =
-            RawRecords::open(path, &RawFormat::default(), record_shape(&scene.content))?;
+        let mut records = recorded::open(path, &RawFormat::default(), &scene.content)?;
         records.scale = self.scale.unwrap_or(1.0);
         records.is_reversed = self.towards;
         let (plan, is_own) = recorded::plan(scene.clone(), &records, observer)?;

@@ -4,10 +4,8 @@ use super::Cli;
 use super::args::{FolderArgs, noise, positive};
 use super::options::IN_MEMORY;
 use crate::Error;
-use crate::io::raw::{RawFormat, RawRecords};
-use crate::measure::recorded::{
-    self, NoiseLevel, RayTable, Recorded, RecordedOptions, record_shape,
-};
+use crate::io::raw::RawFormat;
+use crate::measure::recorded::{self, NoiseLevel, RayTable, Recorded, RecordedOptions};
 use crate::plan::Plan;
 use crate::write;
 use clap::Args;
@@ -50,7 +48,7 @@ pub(super) fn estimate(args: &EstimateArgs, cli: &Cli) -> Result<(), Error> {
             cli.refuse_idle(&args.data, IN_MEMORY)?;
             records.not_empty()?
         }
-        None => RawRecords::open(&args.data, &args.format, record_shape(&scene.content))?,
+        None => recorded::open(&args.data, &args.format, &scene.content)?,
     };
     records.scale = args.scale;
     records.is_reversed = args.towards;

@@ -6,8 +6,8 @@ use std::fs;
 use std::path::Path;
 use wakescope_sim::Silent;
 use wakescope_sim::io::csv_input::TextTable;
-use wakescope_sim::io::raw::{RawFormat, RawRecords};
-use wakescope_sim::measure::recorded::{self, Recorded, RecordedOptions, record_shape};
+use wakescope_sim::io::raw::RawFormat;
+use wakescope_sim::measure::recorded::{self, Recorded, RecordedOptions};
 use wakescope_sim::plan::Plan;
 use wakescope_sim::scene::SceneFile;
 
@@ -410,8 +410,7 @@ fn arrays_that_numpy_wrote_are_read_by_name() {
     // np.savez("numpy.npz", signals=np.arange(24, dtype="<i2").reshape(4, 6), elevation_rad=[0.1, 0.1, 0.2, 0.2])
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/reference/sim/numpy.npz");
     let scene = SceneFile::parse(SMALL, Path::new("s.toml")).unwrap();
-    let mut records =
-        RawRecords::open(&path, &RawFormat::default(), record_shape(&scene.content)).unwrap();
+    let mut records = recorded::open(&path, &RawFormat::default(), &scene.content).unwrap();
     assert_eq!(
         (records.records, records.samples, records.is_complex),
         (4, 6, false)
@@ -435,11 +434,8 @@ fn tiles_change_no_bit(words: &str) {
     let temp = recorded_run(words);
     let scene = SceneFile::read(&temp.path().join("s.toml")).unwrap();
     let with = |block_bytes: Option<usize>| {
-        let (path, shape) = (
-            temp.path().join("o/signals.nc"),
-            record_shape(&scene.content),
-        );
-        let mut records = RawRecords::open(&path, &RawFormat::default(), shape).unwrap();
+        let path = temp.path().join("o/signals.nc");
+        let mut records = recorded::open(&path, &RawFormat::default(), &scene.content).unwrap();
         let plan = Plan::new(scene.clone(), wakescope_sim::Target::Map).unwrap();
         let options = RecordedOptions {
             block_bytes,

@@ -5,7 +5,7 @@ use super::wakescope;
 use std::fs;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
-use wakescope_sim::io::raw::{RawFormat, RawRecords, RecordShape};
+use wakescope_sim::io::raw::{RawFormat, RawRecords};
 
 /// An array as numpy stores it.
 fn npy(kind: &[u8], shape: &str, numbers: &[u8]) -> Vec<u8> {
@@ -79,11 +79,7 @@ fn write_npz(path: &Path, arrays: &[(&str, Vec<u8>, u64)]) {
 }
 
 fn opened(path: &Path) -> Result<RawRecords, String> {
-    let shape = RecordShape {
-        samples: 3,
-        pulses_per_line: 1,
-    };
-    RawRecords::open(path, &RawFormat::default(), shape).map_err(|e| e.to_string())
+    RawRecords::open(path, &RawFormat::default(), 3, 1).map_err(|e| e.to_string())
 }
 
 #[test]

@@ -130,7 +130,7 @@ fn power_of_ten(number: &str) -> String {
 }
 
 /// The rows of a CSV file as a table.
-pub(super) fn table_of_csv(id: &str, csv: &str) -> Result<String, Failure> {
+fn table_of_csv(id: &str, csv: &str) -> Result<String, Failure> {
     let (names, rows) = rows_of(csv);
     let header: Vec<&str> = names.iter().map(String::as_str).collect();
     let mut cells = Vec::new();
@@ -144,7 +144,7 @@ pub(super) fn table_of_csv(id: &str, csv: &str) -> Result<String, Failure> {
 const THUMBNAIL_CELLS: [usize; 3] = [5, 2, 19];
 
 /// The first cells of a CSV file as a small picture.
-pub(super) fn thumbnail_of_csv(csv: &str) -> String {
+fn thumbnail_of_csv(csv: &str) -> String {
     let (names, rows) = rows_of(csv);
     let [most_rows, most_columns, letters] = THUMBNAIL_CELLS;
     let mut text = String::new();
@@ -160,11 +160,19 @@ pub(super) fn thumbnail_of_csv(csv: &str) -> String {
     format!("<svg viewBox=\"0 0 320 213\" aria-hidden=\"true\" class=\"cells\">{text}</svg>")
 }
 
-/// A picture, whose content a thumbnail can show again.
-pub(super) struct Picture<'s> {
-    id: &'s str,
-    view_box: &'s str,
-    content: &'s str,
+/// What a figure shows.
+pub(super) enum Picture<'s> {
+    /// A drawing, whose content a thumbnail can show again.
+    Drawing {
+        id: &'s str,
+        view_box: &'s str,
+        content: &'s str,
+    },
+    /// The rows of a table, as CSV.
+    Rows {
+        id: &'s str,
+        csv: std::borrow::Cow<'s, str>,
+    },
 }
 
 impl<'s> Picture<'s> {
@@ -188,29 +196,37 @@ impl<'s> Picture<'s> {
                 "picture of {id} = {start}: one <svg> element with a viewBox and without script"
             )));
         }
-        Ok(Self {
+        Ok(Self::Drawing {
             id,
             view_box,
             content,
         })
     }
 
-    /// The picture with a text in its place for those who cannot see it.
-    pub(super) fn full(&self, alternative: &str) -> String {
-        let Self {
-            id,
-            view_box,
-            content,
-        } = self;
-        format!(
-            "<svg viewBox=\"{view_box}\" role=\"img\" aria-label=\"{}\" font-family=\"Ubuntu, 'Segoe UI', Arial, sans-serif\"><g id=\"picture-{id}\">{content}</g></svg>\n",
-            escape(alternative)
-        )
+    /// The whole of it, a drawing with a text in its place for those who cannot see it.
+    ///
+    /// # Errors
+    /// Fails if rows are no table.
+    pub(super) fn full(&self, alternative: &str) -> Result<String, Failure> {
+        match self {
+            Self::Drawing {
+                id,
+                view_box,
+                content,
+            } => Ok(format!(
+                "<svg viewBox=\"{view_box}\" role=\"img\" aria-label=\"{}\" font-family=\"Ubuntu, 'Segoe UI', Arial, sans-serif\"><g id=\"picture-{id}\">{content}</g></svg>\n",
+                escape(alternative)
+            )),
+            Self::Rows { id, csv } => table_of_csv(id, csv),
+        }
     }
 
-    /// The same picture once more, a high one cut to its upper part; the link about it has the words.
+    /// The same once more and small, a high drawing cut to its upper part; the link about it has the words.
     pub(super) fn thumbnail(&self) -> String {
-        let Self { id, view_box, .. } = self;
+        let (id, view_box) = match self {
+            Self::Drawing { id, view_box, .. } => (id, view_box),
+            Self::Rows { csv, .. } => return thumbnail_of_csv(csv),
+        };
         let size: Vec<f64> = view_box.split(' ').flat_map(str::parse).collect();
         let is_wide = matches!(size[..], [_, _, width, height] if width > 1.6 * height);
         let fit = if is_wide {
@@ -248,7 +264,7 @@ mod tests {
     fn a_picture_is_shown_twice_and_written_once() {
         let svg = "<svg width=\"2\" viewBox=\"0 0 2 1\"><rect/></svg>\n";
         let picture = Picture::new("fig01", svg).unwrap();
-        let full = picture.full("a <b>");
+        let full = picture.full("a <b>").unwrap();
         assert!(full.contains("<g id=\"picture-fig01\"><rect/></g>"));
         assert!(full.contains("aria-label=\"a &lt;b&gt;\""));
         let thumbnail = picture.thumbnail();

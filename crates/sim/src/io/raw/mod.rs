@@ -97,15 +97,6 @@ impl RawFormat {
 #[cfg(feature = "cli")]
 const KINDS: [&str; 8] = ["i8", "u8", "i16", "u16", "i32", "u32", "f32", "f64"];
 
-/// What a scene says of a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RecordShape {
-    /// Samples of a record.
-    pub samples: usize,
-    /// Pulses of a line of sight.
-    pub pulses_per_line: usize,
-}
-
 /// What a file says of its records.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct About {
@@ -171,7 +162,12 @@ impl RawRecords {
     /// # Errors
     /// A file that cannot be read, is damaged, has another shape than its header says or needs words that `format` lacks; an option
     /// of `format` that has no effect on a file of its kind.
-    pub fn open(path: &Path, format: &RawFormat, shape: RecordShape) -> Result<Self, Error> {
+    pub fn open(
+        path: &Path,
+        format: &RawFormat,
+        samples: usize,
+        pulses_per_line: usize,
+    ) -> Result<Self, Error> {
         let refuse = |reason: String| Error::Input {
             path: path.to_owned(),
             reason,
@@ -181,7 +177,8 @@ impl RawRecords {
         let numbers = Numbers {
             path,
             format,
-            shape,
+            samples,
+            pulses_per_line,
         };
         let found = match &magic[..] {
             _ if format.number.is_some() => numbers
@@ -205,7 +202,8 @@ impl RawRecords {
                 complex: false,
                 ..format.clone()
             };
-            if Self::open(path, &without, shape)?.is_complex == found.is_complex {
+            if Self::open(path, &without, samples, pulses_per_line)?.is_complex == found.is_complex
+            {
                 return Err(refuse(
                     "--complex has no effect: its last index does not run over pairs of numbers"
                         .into(),
@@ -339,13 +337,17 @@ impl RawRecords {
 struct Numbers<'a> {
     path: &'a Path,
     format: &'a RawFormat,
-    shape: RecordShape,
+    /// Samples of a record and pulses of a line of sight, as the scene has them.
+    samples: usize,
+    pulses_per_line: usize,
 }
 
 impl Numbers<'_> {
     /// A file of nothing but numbers behind a header.
     fn binary(self, length: u64) -> Result<StoredArray, String> {
-        let Self { format, shape, .. } = self;
+        let Self {
+            format, samples, ..
+        } = self;
         let name = format.number.as_deref().unwrap_or_default();
         let number = NumberType::named(name)
             .ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
@@ -358,7 +360,7 @@ impl Numbers<'_> {
             begin: format.header_bytes,
         };
         let sample_bytes = array.sample_bytes();
-        let record_bytes = shape.samples as u64 * sample_bytes;
+        let record_bytes = samples as u64 * sample_bytes;
         let data = length.checked_sub(format.header_bytes);
         let data = data.ok_or_else(|| {
             format!(
@@ -371,13 +373,10 @@ impl Numbers<'_> {
             return Err(format!(
                 "behind a header of {} bytes it holds {data} bytes, no whole number of records of {} samples of {sample_bytes} bytes: {rest} \
              are left over; scan.range_min_m and range_max_m say how many samples a record has",
-                format.header_bytes, shape.samples
+                format.header_bytes, samples
             ));
         }
-        let mut lengths = vec![
-            data.checked_div(record_bytes).unwrap_or(0),
-            shape.samples as u64,
-        ];
+        let mut lengths = vec![data.checked_div(record_bytes).unwrap_or(0), samples as u64];
         if format.order == Order::SampleMajor {
             lengths.reverse();
         }
@@ -392,7 +391,8 @@ impl Numbers<'_> {
         let Self {
             path,
             format,
-            shape,
+            pulses_per_line,
+            ..
         } = self;
         let mut lengths = std::mem::take(&mut stored.shape);
         let pairs =
@@ -433,7 +433,7 @@ impl Numbers<'_> {
             order,
             records,
             samples,
-            pulses_per_line: shape.pulses_per_line,
+            pulses_per_line,
         };
         Ok(RawRecords {
             zero,

@@ -199,22 +199,14 @@ fn about(file: &NetcdfFile, records: usize) -> Result<About, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{RawFormat, RawRecords, RecordShape};
+    use super::super::{RawFormat, RawRecords};
     use crate::io::netcdf::{Data, Layout, Variable};
     use num_complex::Complex;
 
     fn opened(bytes: Vec<u8>, format: &RawFormat) -> RawRecords {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), bytes).unwrap();
-        RawRecords::open(
-            file.path(),
-            format,
-            RecordShape {
-                samples: 4,
-                pulses_per_line: 3,
-            },
-        )
-        .unwrap()
+        RawRecords::open(file.path(), format, 4, 3).unwrap()
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub use result::{MeasuredScan, measured_map};
 pub use spectra::Spectra;
 
 use crate::Error;
-use crate::io::raw::{RawRecords, RecordShape};
+use crate::io::raw::{RawFormat, RawRecords};
 use crate::measure::map::{self, AddRecords, VelocityEstimates};
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage, Target};
@@ -30,6 +30,7 @@ use crate::setup::scan_lines;
 use crate::setup::sizes::records_at_once;
 use num_complex::Complex;
 use std::ops::Range;
+use std::path::Path;
 use wakescope_estimate::window::{Sample, SampleSizes};
 use wakescope_signal::digitise::Clipped;
 
@@ -77,12 +78,17 @@ pub enum Recorded {
     },
 }
 
-/// What a scene says of a record.
-pub fn record_shape(scene: &Scene) -> RecordShape {
-    RecordShape {
-        samples: scene.samples_per_record(),
-        pulses_per_line: scene.scan.pulses_per_line,
-    }
+/// Opens a file of raw signals, with the samples and pulses that a scene has.
+///
+/// # Errors
+/// As [`RawRecords::open`].
+pub fn open(path: &Path, format: &RawFormat, scene: &Scene) -> Result<RawRecords, Error> {
+    RawRecords::open(
+        path,
+        format,
+        scene.samples_per_record(),
+        scene.scan.pulses_per_line,
+    )
 }
 
 /// The plan for the records of a file: that of the scene with as many repetitions as the file has, its receiver mirrored where the
