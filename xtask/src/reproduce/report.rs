@@ -460,7 +460,7 @@ mod tests {
         // Of both claims statement, expected, measured, decided by, value and link, which has the figure twice; the number
         // of the one that is not of the chapter.
         let of_claims = 2 * (2 * 7 + 1);
-        let of_comparison = 4;
+        let of_comparison = 2;
         // Of the table a name, which phones show beside the cell, and a cell; both in the thumbnail.
         let of_table = 3 + 2;
         assert_eq!(
