@@ -15,12 +15,15 @@ struct Field {
     allowed: Vec<String>,
 }
 
+/// One value of the key that chooses: the value, its meaning, the table whose keys follow, if any, and further keys.
+type KindKeys = (String, String, String, Vec<Field>);
+
 /// What the source declares, by the names of the types.
 #[derive(Default)]
 struct Declarations {
     tables: BTreeMap<String, Vec<Field>>,
-    /// The key that chooses, and for each of its values the meaning, the table whose keys follow, if any, and further keys.
-    kinds: BTreeMap<String, (String, Vec<(String, String, String, Vec<Field>)>)>,
+    /// The key that chooses, and its values.
+    kinds: BTreeMap<String, (String, Vec<KindKeys>)>,
     /// Variants and their names in files.
     choices: BTreeMap<String, Vec<(String, String)>>,
     /// What constants that are limits allow.
@@ -266,7 +269,7 @@ fn choices(tokens: &[TokenTree]) -> Vec<(String, String)> {
     found
 }
 
-fn kinds(tokens: &[TokenTree]) -> Vec<(String, String, String, Vec<Field>)> {
+fn kinds(tokens: &[TokenTree]) -> Vec<KindKeys> {
     let mut found = Vec::new();
     for part in parts(tokens) {
         let (meaning, part) = documented(part);

@@ -23,23 +23,23 @@ pub struct PairPrior {
     /// Median of the spacing, which is log-normal \[m\].
     pub median_spacing_m: f64,
     /// Standard deviation of the natural logarithm of the spacing.
-    pub log_spacing_deviation: f64,
+    pub log_deviation: f64,
     /// Standard deviation of the difference of the circulations over their mean, which is normal about 0.
-    pub circulation_difference: f64,
+    pub relative_difference: f64,
 }
 
 impl PairPrior {
     /// Spacings of 16 to 63 m, pi/4 of spans of 20 to 80 m, are within 1.4 standard deviations; so are circulations in the ratio of 1 to 1.8.
     pub const AIRCRAFT: Self = Self {
         median_spacing_m: 32.0,
-        log_spacing_deviation: 0.5,
-        circulation_difference: 0.4,
+        log_deviation: 0.5,
+        relative_difference: 0.4,
     };
 
     pub(crate) fn validate(&self) -> Result<(), Error> {
         positive("median_spacing_m", self.median_spacing_m)?;
-        positive("log_spacing_deviation", self.log_spacing_deviation)?;
-        positive("circulation_difference", self.circulation_difference)
+        positive("log_deviation", self.log_deviation)?;
+        positive("relative_difference", self.relative_difference)
     }
 
     /// Distances from the prior in standard deviations, and their derivatives by all free numbers: of the spacing where both lateral positions are
@@ -61,14 +61,14 @@ impl PairPrior {
         let [left, right] = [wake.left.circulation_m2_s, wake.right.circulation_m2_s];
         let sum = left + right;
         if are_free(CIRCULATIONS) && sum > 0.0 {
-            let away = 2.0 * (left - right) / sum / self.circulation_difference;
-            let by = 4.0 / (sum * sum * self.circulation_difference);
+            let away = 2.0 * (left - right) / sum / self.relative_difference;
+            let by = 4.0 / (sum * sum * self.relative_difference);
             add(away, CIRCULATIONS, [by * right, -by * left]);
         }
         let spacing_m = wake.spacing_m();
         if are_free(LATERAL) && spacing_m > 0.0 {
-            let away = (spacing_m / self.median_spacing_m).ln() / self.log_spacing_deviation;
-            let by = (self.log_spacing_deviation * spacing_m).recip();
+            let away = (spacing_m / self.median_spacing_m).ln() / self.log_deviation;
+            let by = (self.log_deviation * spacing_m).recip();
             add(away, LATERAL, [-by, by]);
         }
         terms
