@@ -78,7 +78,7 @@ const UNITS: [(&str, &str); 5] = [
     ("_rad", " [rad]"),
 ];
 
-/// A name with its unit as in print: `delay_s` is "delay [s]".
+/// A name with its unit as in print: `delay_s` is "delay \[s\]".
 fn column_name(name: &str) -> String {
     for (suffix, unit) in UNITS {
         if let Some(quantity) = name.strip_suffix(suffix) {
