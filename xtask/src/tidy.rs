@@ -135,7 +135,7 @@ fn check_words(file: &SourceFile, found: &mut Vec<String>) {
         return;
     }
     for (i, line) in file.text.lines().enumerate() {
-        if line.trim() == "#[cfg(test)]" {
+        if line.starts_with("mod tests {") {
             return;
         }
         // Of a source the texts between quotation marks, and what becomes help.
@@ -299,6 +299,26 @@ fn check_manifest(folder: &str, allowed: &BTreeSet<String>, text: &str, found: &
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_that_are_no_plain_english_are_found_in_pages_texts_and_help() {
+        let found = |path: &str, text: &str| {
+            let mut found = Vec::new();
+            check_words(&file(path, text), &mut found);
+            found.len()
+        };
+        assert_eq!(found("docs/src/a.md", "It was told. Untold, told_m."), 1);
+        let source = "#[cfg(test)]\nmod a_tests;\nfail(\"so many\"); // so many\n";
+        assert_eq!(found("crates/sim/src/a.rs", source), 1);
+        assert_eq!(
+            found("crates/sim/src/cli/a.rs", "    /// It bears outliers.\n"),
+            1
+        );
+        assert_eq!(
+            found("crates/sim/src/a.rs", "mod tests {\n    \"told\"\n}\n"),
+            0
+        );
+    }
 
     fn file(path: &str, text: &str) -> SourceFile {
         SourceFile {

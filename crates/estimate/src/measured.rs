@@ -44,3 +44,30 @@ impl Measured {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_has_its_binomial_standard_error() {
+        let share = Measured::share(90, 100);
+        assert!((share.value - 0.9).abs() < 1e-15 && (share.std - 0.03).abs() < 1e-15);
+    }
+
+    #[test]
+    fn relative_variances_of_a_product_add() {
+        let product = Measured {
+            value: -2.0,
+            std: 0.06,
+        }
+        .times(Measured {
+            value: 5.0,
+            std: 0.2,
+        });
+        assert_eq!(product.value, -10.0);
+        assert!((product.std - 0.5).abs() < 1e-15, "{product:?}");
+        assert!((product.bound() - 11.0).abs() < 1e-14);
+        assert_eq!(Measured::exact(3.0).bound(), 3.0);
+    }
+}

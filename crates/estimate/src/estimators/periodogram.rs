@@ -55,8 +55,8 @@ impl<S: Sample> PeriodogramPlan<S> {
         )
     }
 
-    /// With a weighting h of the window, so many frequencies M of the zero-padded spectrum over 0 .. F_s, and a placement of
-    /// the peak between them.
+    /// With the weighting h of the window, the number M of frequencies of the zero-padded spectrum over
+    /// 0 .. F_s, and the placement of the peak between them.
     ///
     /// # Errors
     /// [`Error::Band`] or [`Error::OutOfRange`] if sampling, window or another argument makes no sense.

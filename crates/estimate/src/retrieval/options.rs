@@ -21,12 +21,14 @@ pub enum Gate {
     Kernel(RangeKernel),
 }
 
-/// Gates resolve the vortices of a pair if their standard deviation is less than this part of the spacing, or of the typical one \[m\].
+/// Gates resolve the vortices of a pair if their standard deviation is less than this fraction of
+/// the spacing, or of the typical one \[m\].
 const SHORT: f64 = 0.4;
 const TYPICAL_M: f64 = 45.0;
 
 impl Gate {
-    /// Whether the weight is so short that a scan tells circulation and spacing of a pair with that spacing \[m\] apart, and a pair from one vortex.
+    /// Whether the weight is short enough to distinguish a pair of that spacing \[m\] from one vortex,
+    /// and its circulation from its spacing.
     #[must_use]
     pub fn resolves(&self, spacing_m: f64) -> bool {
         let std_m = match self {

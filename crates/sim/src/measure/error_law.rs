@@ -96,9 +96,9 @@ pub struct ErrorLaw {
 }
 
 impl ErrorLaw {
-    /// Of the realisations of a map whose neighbours share windows over so many lines and gates,
-    /// and whose estimates are within a band of that half width, m/s; nothing of fewer than two
-    /// realisations.
+    /// Of the realisations of a map; `shared` is the number of lines and gates over which neighbours
+    /// share windows, `half_band_m_s` the half width of the band of estimates. None of fewer than
+    /// two realisations.
     #[must_use]
     pub fn new(scans: &[ScanErrors], shared: [f64; 2], half_band_m_s: f64) -> Option<Self> {
         let shape = scans.get(1)?.error_m_s.dim();

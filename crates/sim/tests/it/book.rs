@@ -125,9 +125,13 @@ fn command_lines(page: &str) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn commands_of_the_tutorials_run() {
-    for name in ["tutorial-cfradial.md", "tutorial-signals.md"] {
-        let page = std::fs::read_to_string(root().join("docs/src").join(name)).unwrap();
+fn commands_of_the_readme_and_the_tutorials_print_what_the_pages_show() {
+    for (name, least) in [
+        ("README.md", 3),
+        ("docs/src/tutorial-cfradial.md", 4),
+        ("docs/src/tutorial-signals.md", 4),
+    ] {
+        let page = std::fs::read_to_string(root().join(name)).unwrap();
         let temp = tempfile::tempdir().unwrap();
         for block in blocks(&page, "toml") {
             let file = block
@@ -137,20 +141,26 @@ fn commands_of_the_tutorials_run() {
                 .unwrap();
             std::fs::write(temp.path().join(file), block).unwrap();
         }
-        let commands: Vec<&str> = blocks(&page, "sh")
-            .iter()
-            .flat_map(|block| block.lines())
-            .collect();
-        assert!(commands.len() >= 4, "{name}: {commands:?}");
+        let lines = blocks(&page, "sh").into_iter().flat_map(str::lines);
+        let commands: Vec<&str> = lines.filter(|line| !line.starts_with("cargo ")).collect();
+        assert!(commands.len() >= least, "{name}: {commands:?}");
+        let mut printed = String::new();
         for command in commands {
+            let command = command.split('#').next().unwrap();
             let words: Vec<&str> = command.split_whitespace().collect();
             assert_eq!(words[0], "wakescope", "{name}: {command}");
-            let out = wakescope(temp.path(), &[&words[1..], &["--quiet"]].concat());
-            assert!(
-                out.status.success(),
-                "{name}: {command}: {}",
-                String::from_utf8_lossy(&out.stderr)
-            );
+            let out = wakescope(temp.path(), &words[1..]);
+            let complaint = String::from_utf8_lossy(&out.stderr);
+            assert!(out.status.success(), "{name}: {command}: {complaint}");
+            printed += &String::from_utf8_lossy(&out.stdout);
+        }
+        let shown: Vec<&str> = page
+            .lines()
+            .filter(|line| line.starts_with("scan "))
+            .collect();
+        assert!(!shown.is_empty() || name.ends_with("signals.md"), "{name}");
+        for line in shown {
+            assert!(printed.contains(line), "{name}: {line}\nnot in\n{printed}");
         }
     }
 }

@@ -182,7 +182,8 @@ pub struct MapFitOptions {
 }
 
 impl Default for MapFitOptions {
-    /// All parameters, core radii as they typically are, pairs as aircraft have them, the loss of Cauchy, 8 correlated lines; a statistic above those of empty scans (the ignored test
+    /// All parameters free, priors of typical core radii and of pairs behind aircraft, the loss of
+    /// Cauchy, 8 correlated lines; a statistic above those of empty scans (the ignored test
     /// `narrow_sectors_of_many_kinds` of the program).
     fn default() -> Self {
         Self {

@@ -299,8 +299,9 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
         }
     }
 
-    /// Where fits of means over `kernel` end from some guesses, each with its guess where a vortex left the map on the way, or the guess alone where
-    /// the fit comes to no end: taken for means, peaks mislead above all the core radius, which stays as it is, and may lead nowhere.
+    /// Minima of fits of means over `kernel`, started from some guesses. A guess is returned, too,
+    /// where a vortex left the map during the fit, and alone where the fit did not converge. Peaks
+    /// that are fitted as means mislead the core radius most, so it is fixed.
     fn ends_of_means(&self, guesses: &[Wake], kernel: &RangeKernel) -> Vec<Wake> {
         let model = self.prepared.model;
         let sector = (self.map.elevation_rad, self.map.range_m);

@@ -141,7 +141,7 @@ fn merged(mut ends: Vec<MapFit>) -> Option<MapFit> {
     let (best, others) = ends.split_first()?;
     let others = others.iter().filter(|end| !same(best, end, SAME_SIGMAS));
     let all: Vec<&MapFit> = std::iter::once(best).chain(others).collect();
-    // the covariance of an unlikely end may be beyond all bounds: weighed with its likelihood it would still hide what the best one shows
+    // the covariance of an unlikely minimum may be so large that its weight does not make up for it
     let likely = all.iter().filter(|end| chi2(end) - chi2(best) < COMPETES);
     let weighted = likely.map(|end| {
         (

@@ -1,8 +1,9 @@
 //! Prior density of the pair behind an aircraft: its spacing is that of a wing, and both vortices carry the lift of one wing.
 //!
-//! Without it the likelihood of a map that shows little of a vortex is as high for vortices that no aircraft makes: two of a thousand square metres
-//! per second and more, a few metres apart, or one beyond the last gate that is the stronger the farther away it is. Their part of the covariance
-//! hides the circulation of the pair that is there. Check: difference quotients; the spread of fits over many maps.
+//! Where a map shows little of a vortex, two kinds of pairs that no aircraft makes are as likely
+//! without it: circulations of 1000 m^2/s and more a few metres apart, and a vortex beyond the last
+//! gate, the stronger the farther away. Their covariance hides the circulation of the true pair.
+//! Check: difference quotients; the spread of fits over many maps.
 
 use crate::error::{Error, positive};
 use crate::vortex_fit::wake::free_parameters::gathered;
