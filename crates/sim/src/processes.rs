@@ -99,7 +99,8 @@ impl Ranks for Processes {
         receive: &mut [f64],
         from: &[usize],
     ) -> Result<(), wakescope_les::Error> {
-        let (to, from) = (parts(to)?, parts(from)?);
+        let to = parts(to)?;
+        let from = parts(from)?;
         let send = Partition::new(send, to.0, to.1);
         let mut receive = PartitionMut::new(receive, from.0, from.1);
         SimpleCommunicator::world().all_to_all_varcount_into(&send, &mut receive);
@@ -118,10 +119,8 @@ fn parts(lengths: &[usize]) -> Result<(Vec<Count>, Vec<Count>), wakescope_les::E
     let starts = lengths.iter().map(start).collect();
     let most = Count::MAX as usize;
     if end > most {
-        let (field, allowed) = (
-            "values in a message between ranks",
-            "at most 2147483647: take more ranks",
-        );
+        let field = "values in a message between ranks";
+        let allowed = "at most 2147483647: take more ranks";
         return Err(wakescope_les::Error::OutOfRange {
             field,
             value: end as f64,

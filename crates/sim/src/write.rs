@@ -223,7 +223,8 @@ fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Resu
 /// [`Error::Input`] for another ending; an existing file that may not be replaced, or what the system says.
 #[cfg(feature = "plots")]
 pub fn write_set_up(plan: &Plan, path: &Path, existing: Existing) -> Result<(), Error> {
-    let (figure, origin) = (pictures::scan(plan), plan.scene.provenance());
+    let figure = pictures::scan(plan);
+    let origin = plan.scene.provenance();
     let bytes = match path.extension().and_then(|ending| ending.to_str()) {
         Some("svg") => figure.svg(&origin)?.into_bytes(),
         Some("png") => figure.png(&origin)?,
@@ -270,7 +271,8 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
 
 /// The raw signals of a run, with what makes them readable.
 fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
-    let (scene, g) = (&plan.scene.content, &plan.geometry);
+    let scene = &plan.scene.content;
+    let g = &plan.geometry;
     let beams: Vec<Beam> = (0..g.schedule.pulses())
         .map(|pulse| g.schedule.beam_of_pulse(pulse))
         .collect();
@@ -300,7 +302,8 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
 
 fn recording(plan: &Plan) -> Recording {
     let scene = &plan.scene.content;
-    let (d, receiver) = (&scene.detector, &plan.instrument.receiver);
+    let d = &scene.detector;
+    let receiver = &plan.instrument.receiver;
     let is_baseband = d.signal == DetectorSignal::Baseband;
     // (13) in the band; white noise goes to half the sampling frequency, and to both sides of zero in two quadratures.
     let noise_band_hz = match d.noise {

@@ -400,7 +400,8 @@ mod order_tests {
         for p in [1.2, 2.0, 4.0] {
             let (order, errors) = found(|t, h| (1.0 + 0.01 * t * h.powf(p)) * (-0.1 * t).exp());
             assert!((order.unwrap() / p - 1.0).abs() < 1e-9, "{order:?} {p}");
-            let (mut off, mut all) = (0.0, 0.0);
+            let mut off = 0.0;
+            let mut all = 0.0;
             for t in 0..9 {
                 let (t, decay) = (f64::from(t), (-0.2 * f64::from(t)).exp());
                 off += (0.01 * t * SPACINGS[1].powf(p)).powi(2) * decay;

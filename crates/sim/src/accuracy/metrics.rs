@@ -281,7 +281,8 @@ mod tests {
 
     #[test]
     fn metrics_of_gaussian_errors_and_their_standard_errors_match_closed_forms() {
-        let (m, n) = (16, 4000);
+        let m = 16;
+        let n = 4000;
         let own = sample(m, n, |e| e + 1.0);
         let all = vec![true; n];
         let of = |metric| own.statistic(metric, &all);
@@ -308,7 +309,8 @@ mod tests {
 
     #[test]
     fn shifts_paired_by_seed_have_no_noise_where_errors_are_proportional() {
-        let (fine, coarse) = (sample(8, 500, |e| e), sample(8, 500, |e| 1.02 * e));
+        let fine = sample(8, 500, |e| e);
+        let coarse = sample(8, 500, |e| 1.02 * e);
         assert_eq!(fine.shift(&fine, Metric::Std), Measured::default());
         let found = coarse.shift(&fine, Metric::Std);
         assert!(
@@ -347,7 +349,8 @@ mod tests {
             offset_m_s: vec![0.0; 500],
             ..sample(8, 500, |e| e)
         };
-        let (noise, rms) = (still.noise(Metric::Bias), still.noise(Metric::Rms));
+        let noise = still.noise(Metric::Bias);
+        let rms = still.noise(Metric::Rms);
         assert!(
             noise.is_finite() && noise < 0.2 && rms < 0.05,
             "{noise} {rms}"

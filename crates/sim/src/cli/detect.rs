@@ -68,7 +68,8 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
         .as_deref()
         .map(|path| cli.scene(path))
         .transpose()?;
-    let (mut scans, mut notes) = (Vec::new(), Vec::new());
+    let mut scans = Vec::new();
+    let mut notes = Vec::new();
     let inputs = each_usable(&args.data, &*observer, |path| {
         args.scans.read(path, stated.as_ref(), false, &*observer)
     })?;
@@ -182,8 +183,9 @@ fn told(
 ) {
     for (scan, found) in scans.iter().zip(found) {
         let verdict = if found.is_wake() { "wake" } else { "no wake" };
-        let (statistic, threshold, rate) =
-            (found.statistic.value, found.threshold, found.false_alarm);
+        let statistic = found.statistic.value;
+        let threshold = found.threshold;
+        let rate = found.false_alarm;
         let reached = if rate < 1e-12 {
             "less than 1e-12".into()
         } else {
@@ -213,8 +215,10 @@ fn told(
         }
     }
     if let Some(power) = power {
-        let ((mu, beta), (measured, foretold)) = (power.gumbel, power.smallest_m2_s);
-        let (threshold, rate) = (power.threshold, power.false_alarm);
+        let (mu, beta) = power.gumbel;
+        let (measured, foretold) = power.smallest_m2_s;
+        let threshold = power.threshold;
+        let rate = power.false_alarm;
         let doubt = if (1.5..2.6).contains(&beta) {
             ""
         } else {
@@ -224,7 +228,8 @@ fn told(
         text.push(format!(
             "threshold {threshold:.2} for {rate} false alarms a scan; {law}"
         ));
-        let (error, bound) = (power.smallest_error_m2_s, power.circulation_std_m2_s);
+        let error = power.smallest_error_m2_s;
+        let bound = power.circulation_std_m2_s;
         let by_bound = format!("from the bound of {bound:.2} m^2/s: {foretold:.1}");
         text.push(format!(
             "circulation detected with probability 0.9: {measured:.1} +- {error:.1} m^2/s ({by_bound})"

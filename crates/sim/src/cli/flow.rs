@@ -266,7 +266,8 @@ fn on_processes(
     let ranks = world.ranks();
     if ranks.rank() == 0 && !cli.quiet {
         use std::io::Write as _;
-        let (count, threads) = (ranks.count(), rayon::current_num_threads());
+        let count = ranks.count();
+        let threads = rayon::current_num_threads();
         let _ = writeln!(
             std::io::stderr(),
             "{count} ranks; threads of the first: {threads}"

@@ -390,7 +390,8 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     let mut object = plan_json(&plan);
     object["results"] = Value::Object(values);
     if let Some(retrieval) = &outcome.retrieval {
-        let (errors, detected) = (retrieval.error_table(), retrieval.detected());
+        let errors = retrieval.error_table();
+        let detected = retrieval.detected();
         text += &errors.aligned();
         let share = "share of scans in which the test finds a wake";
         text.extend(detected.map(|found| format!("{share:<44} {}\n", digits(found))));

@@ -243,10 +243,8 @@ pub(super) fn retrieve(args: &RetrieveArgs, cli: &Cli) -> Result<(), Error> {
             .iter()
             .any(|scan| !scan.result.vortices.is_empty());
     let text = text(&found.scans) + if is_of_signals { HEIGHTS } else { "" };
-    let (of, object) = (
-        (Default::default(), provenance(&scenes)),
-        json!({ "scans": retrieve::json(&found.scans) }),
-    );
+    let of = (Default::default(), provenance(&scenes));
+    let object = json!({ "scans": retrieve::json(&found.scans) });
     args.folder.finish(
         cli,
         of,
@@ -491,7 +489,9 @@ fn list(
     let scans = found.map(|found| found.scans.as_slice());
     files.table("retrieval", scans, |scans| Ok(retrieve::rows(scans)))?;
     files.add("retrieval.json", scans, |scans, origin| {
-        let (program, hash, scans) = (&origin.program, &origin.scene_hash, retrieve::json(scans));
+        let program = &origin.program;
+        let hash = &origin.scene_hash;
+        let scans = retrieve::json(scans);
         Ok(format!(
             "{{\"source\": \"{program}\", \"scene_hash\": \"{hash}\", \"scans\": {scans}}}\n"
         ))

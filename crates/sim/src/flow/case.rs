@@ -144,7 +144,9 @@ impl FlowCase {
         );
         self.check_limits("", &mut p);
         self.case.check(&mut p);
-        let (t, o, c) = (self.time, &self.output, self.checkpoint);
+        let t = self.time;
+        let o = &self.output;
+        let c = self.checkpoint;
         let mut absent = |is_wrong: bool, key: &str, value: &dyn Debug, allowed: &str| {
             p.require(!is_wrong, key, value, format!("absent{allowed}"));
         };

@@ -123,7 +123,8 @@ pub fn run_on(
         None => (start(setup, plan, &mut warnings)?, Vec::new()),
         Some(path) => resume(path, setup, plan, &file.content)?,
     };
-    let (reached_s, end_s) = (run.flow().time_s(), run.plan().end_s);
+    let reached_s = run.flow().time_s();
+    let end_s = run.plan().end_s;
     if reached_s > (1.0 + 1e-9) * end_s {
         let reached_tau = age_tau(reached_s, tau_per_s);
         let reason = format!(
@@ -162,7 +163,8 @@ pub fn run_on(
     if is_first && is_complete {
         observer.end();
     }
-    let (files, warnings) = (writer.written, writer.warnings);
+    let files = writer.written;
+    let warnings = writer.warnings;
     let flow = run.flow();
     Ok(FlowOutcome {
         steps: flow.steps(),

@@ -73,7 +73,8 @@ impl FlowForecast {
         let steps = plan
             .pause_after_steps
             .map_or(to_end, |pause| to_end.min(pause as f64));
-        let (cells, ranks) = (setup.mesh.cells(), setup.settings.ranks.count());
+        let cells = setup.mesh.cells();
+        let ranks = setup.settings.ranks.count();
         // Of a rank with its halos.
         let mut held = cells;
         if ranks > 1 {
@@ -152,7 +153,8 @@ impl fmt::Display for FlowForecast {
             self.steps, self.step_s
         )?;
         if self.damped_courant.is_finite() {
-            let (courant, damped) = (self.courant, self.damped_courant);
+            let courant = self.courant;
+            let damped = self.damped_courant;
             writeln!(
                 f,
                 "  courant  {courant:.3}, all waves of the mesh decay up to {damped:.3}"

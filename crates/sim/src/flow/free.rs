@@ -274,7 +274,8 @@ impl InitialPair {
             profile: crate::setup::wind::circulation_profile(self.profile),
             motion: Motion::Frozen,
         };
-        let (wind, cross_m_s) = (pair.wind().map_err(Error::Flow)?, self.cross_wind_m_s);
+        let wind = pair.wind().map_err(Error::Flow)?;
+        let cross_m_s = self.cross_wind_m_s;
         Ok(Initial::Field(Box::new(move |at_m| {
             let mut velocity = [[0.0; 3]];
             // One point and one place for it: what could be refused would show as a field that is not finite.

@@ -10,7 +10,8 @@ impl Setup {
     /// The setup of a case whose file lies in `folder`.
     pub(super) fn new(case: &FlowCase, folder: &Path) -> Result<Self, Error> {
         let mut setup = case.case.setup(folder)?;
-        let (s, solver) = (&mut setup.settings, &case.solver);
+        let s = &mut setup.settings;
+        let solver = &case.solver;
         s.pressure = solver.pressure;
         s.pressure_tolerance = solver.pressure_tolerance;
         s.subgrid = subgrid(solver.subgrid);

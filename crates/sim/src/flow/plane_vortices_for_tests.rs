@@ -17,7 +17,8 @@ pub(crate) fn folder() -> TempDir {
         let position = |i| (i as f64 + offset) / NODES as f64;
         (0..NODES).map(position).collect()
     };
-    let (face_m, centre_m) = (at(0.0), at(0.5));
+    let face_m = at(0.0);
+    let centre_m = at(0.5);
     let velocity = |component: usize, y_m: &[f64], z_m: &[f64]| -> Vec<f64> {
         let row = |z| {
             let value = move |y| taylor_green_plane_exact([0.0, y, z], 0.0, 0.0)[component];

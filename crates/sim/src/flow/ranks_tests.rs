@@ -54,8 +54,10 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 #[test]
 fn every_file_has_the_bytes_of_one_process_also_after_a_restart_on_other_ranks() {
     let new = || tempfile::tempdir().unwrap();
-    let (paused, whole) = (wake("[time]\npause_after_steps = 3\n"), wake(""));
-    let (alone, ranks) = (new(), new());
+    let paused = wake("[time]\npause_after_steps = 3\n");
+    let whole = wake("");
+    let alone = new();
+    let ranks = new();
     assert_eq!(run(&paused, alone.path(), Begin::New, 1), [None]);
     assert_eq!(
         run(&paused, ranks.path(), Begin::New, 3),
@@ -67,7 +69,8 @@ fn every_file_has_the_bytes_of_one_process_also_after_a_restart_on_other_ranks()
     );
     assert_eq!(run(&whole, alone.path(), Begin::Restart, 1), [None]);
     assert_eq!(run(&whole, ranks.path(), Begin::Restart, 2), [None, None]);
-    let (expected, found) = (files(alone.path()), files(ranks.path()));
+    let expected = files(alone.path());
+    let found = files(ranks.path());
     assert!(expected.len() > 8, "{:?}", expected.keys());
     assert!(
         found.keys().eq(expected.keys()),

@@ -159,7 +159,8 @@ fn an_interrupted_run_leaves_the_same_files_byte_for_byte_as_one_that_was_not() 
             assert!(numbers(&whole, &name) == found, "{name}");
         }
     }
-    let (whole, parts) = (contents(&whole), contents(&parts));
+    let whole = contents(&whole);
+    let parts = contents(&parts);
     for name in ["flow.checkpoint", "steps.csv"] {
         assert!(whole[name] == parts[name], "{name}");
     }
@@ -188,7 +189,8 @@ fn an_interrupted_wake_leaves_the_same_histories_fields_and_planes() {
     run(&small_wake(Some(7)), &parts, Begin::New, &Silent).unwrap();
     let last = run(&small_wake(None), &parts, Begin::Restart, &Silent).unwrap();
     assert_eq!(last.steps, outcome.steps);
-    let (whole, parts) = (contents(&whole), contents(&parts));
+    let whole = contents(&whole);
+    let parts = contents(&parts);
     let end = "nc";
     assert!(
         whole["wake.csv"] == parts["wake.csv"]
@@ -235,7 +237,8 @@ fn the_history_of_a_wake_opens_with_its_axes() {
         .lines()
         .filter(|line| !line.starts_with('#'))
         .map(|line| line.split(',').collect::<Vec<_>>());
-    let (names, last) = (rows.next().unwrap(), rows.next_back().unwrap());
+    let names = rows.next().unwrap();
+    let last = rows.next_back().unwrap();
     assert!(names.contains(&"gamma_ratio_left") && names.contains(&"gamma_ratio_right"));
     for (name, cell) in names.iter().zip(last) {
         let tags = ["_m2_s", "_m", "_s", "_hz"];
@@ -628,7 +631,8 @@ fn a_field_written_by_a_run_starts_another_with_the_same_velocities() {
     for output in ["initial_0001.nc", "initial_0002.nc"] {
         let [a, b] = ["a", "b"].map(|run| numbers(&folder.path().join(run), output));
         for component in ["u", "v", "w"] {
-            let (a, b) = (&a[component], &b[component]);
+            let a = &a[component];
+            let b = &b[component];
             assert_eq!(a.len(), 24 * 24);
             let worst = a
                 .iter()

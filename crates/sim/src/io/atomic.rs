@@ -127,7 +127,8 @@ impl FileGroup {
             // After the last one nothing can fail, so that what it replaces need not be kept: in one step, for others may do the same.
             if let Err(error) = self.put_one(stage, name, place + 1 == self.files.len()) {
                 for (name, _) in self.files[..place].iter().rev() {
-                    let (target, kept) = (self.folder.join(name), stage.old.join(name));
+                    let target = self.folder.join(name);
+                    let kept = stage.old.join(name);
                     let was_there = kept.symlink_metadata().is_ok();
                     drop(if was_there {
                         fs::rename(kept, target)
@@ -149,7 +150,8 @@ impl FileGroup {
 
     /// Puts one file into place; an older one waits in the stage, but for the last file.
     fn put_one(&self, stage: &Stage, name: &str, is_last: bool) -> OutputResult<()> {
-        let (target, kept) = (self.folder.join(name), stage.old.join(name));
+        let target = self.folder.join(name);
+        let kept = stage.old.join(name);
         if target.is_dir() {
             let source = std::io::Error::new(
                 ErrorKind::IsADirectory,
@@ -444,7 +446,8 @@ mod tests {
     fn a_stage_that_is_going_keeps_its_lock_to_the_end_so_that_a_kill_then_leaves_what_is_swept() {
         let temp = tempfile::tempdir().unwrap();
         let stage = Stage::make(temp.path()).unwrap();
-        let (root, old) = (stage.root.clone(), stage.old.clone());
+        let root = stage.root.clone();
+        let old = stage.old.clone();
         fs::remove_dir(&old).unwrap();
         // What stops the removing, as a kill would.
         fs::write(&old, "").unwrap();

@@ -170,7 +170,8 @@ fn site(map: &VelocityMap) -> Values {
     let place = |[x_m, y_m, z_m]: [f64; 3]| {
         let (north_m, east_m) = north_east(x_m, y_m);
         let width = map.site.latitude_deg.to_radians().cos();
-        let (latitude, longitude) = (map.site.latitude_deg, map.site.longitude_deg);
+        let latitude = map.site.latitude_deg;
+        let longitude = map.site.longitude_deg;
         [
             latitude + north_m / DEGREE_M,
             longitude + east_m / (DEGREE_M * width),
@@ -305,7 +306,8 @@ fn texts(map: &VelocityMap) -> Values {
 }
 
 fn instrument(map: &VelocityMap) -> Values {
-    let (rays, pulse) = (map.rays.len(), &map.pulse);
+    let rays = map.rays.len();
+    let pulse = &map.pulse;
     let each = |value: f64| single(&vec![value; rays]);
     vec![
         ("frequency", single(&[pulse.frequency_hz])),

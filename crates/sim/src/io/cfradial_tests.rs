@@ -256,7 +256,8 @@ fn the_bytes_are_the_same_every_time() {
 
 /// Places, m, as degrees north and east on a sphere.
 fn placed(map: &VelocityMap, north_m: f64, east_m: f64) -> [f64; 2] {
-    let (site, degree_m) = (&map.site, 6_371_008.8 * std::f64::consts::PI / 180.0);
+    let site = &map.site;
+    let degree_m = 6_371_008.8 * std::f64::consts::PI / 180.0;
     let width = site.latitude_deg.to_radians().cos();
     [
         site.latitude_deg + north_m / degree_m,

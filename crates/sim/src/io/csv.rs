@@ -271,7 +271,10 @@ mod tests {
             .split_inclusive('\n')
             .filter(|l| !l.starts_with('#'))
             .collect();
-        let (mut rows, mut row, mut cell, mut inside) = (vec![], vec![], String::new(), false);
+        let mut rows = vec![];
+        let mut row = vec![];
+        let mut cell = String::new();
+        let mut inside = false;
         let mut chars = body.chars().peekable();
         while let Some(c) = chars.next() {
             match c {

@@ -63,7 +63,8 @@ impl TextTable {
         let mut rows = Vec::new();
         for row in records {
             if row.len() != header.len() {
-                let (found, wanted) = (row.len(), header.len());
+                let found = row.len();
+                let wanted = header.len();
                 return Err(format!(
                     "row {} has {found} cells, the header {wanted}",
                     rows.len() + 1
@@ -192,7 +193,9 @@ fn records(text: &str, separator: Separator) -> impl Iterator<Item = Vec<String>
                 _ => break,
             }
         }
-        let (mut row, mut cell, mut quoted) = (Vec::new(), String::new(), false);
+        let mut row = Vec::new();
+        let mut cell = String::new();
+        let mut quoted = false;
         while let Some(c) = chars.next() {
             match c {
                 '"' if quoted && chars.peek() == Some(&'"') => cell.extend(chars.next()),
@@ -270,10 +273,8 @@ mod tests {
             "A,B\r1.5,2.5\r3.0,4.0\r",
         ] {
             let table = TextTable::parse(text).expect(text);
-            let (a, b) = (
-                table.column("a").expect(text),
-                table.column("b").expect(text),
-            );
+            let a = table.column("a").expect(text);
+            let b = table.column("b").expect(text);
             let numbers = [0, 1].map(|row| [table.number(row, a), table.number(row, b)]);
             assert_eq!(numbers, [[1.5, 2.5], [3.0, 4.0]], "{text}");
             assert_eq!(table.rows.len(), 2, "{text}");

@@ -72,11 +72,9 @@ impl VelocityField {
 
 #[cfg(test)]
 pub(crate) fn example() -> VelocityField {
-    let (x_m, y_m, z_m) = (
-        vec![0.5, 1.5, 3.0],
-        vec![-1.0, 0.5],
-        vec![0.1, 0.3, 0.7, 1.5],
-    );
+    let x_m = vec![0.5, 1.5, 3.0];
+    let y_m = vec![-1.0, 0.5];
+    let z_m = vec![0.1, 0.3, 0.7, 1.5];
     let field = |a: f64| (0..24).map(|i| a + f64::from(i)).collect::<Vec<f64>>();
     VelocityField {
         title: "A flow".into(),
@@ -95,7 +93,8 @@ pub(crate) fn example() -> VelocityField {
 /// What each of several ranks has of the example: two planes, none, one, one.
 #[cfg(test)]
 pub(crate) fn example_on_ranks() -> Vec<VelocityField> {
-    let (whole, mut is_first) = (example(), true);
+    let whole = example();
+    let mut is_first = true;
     let rank = |planes: std::ops::Range<usize>| {
         let part = |values: &Vec<f64>| values[6 * planes.start..6 * planes.end].to_vec();
         VelocityField {

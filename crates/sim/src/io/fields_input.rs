@@ -233,7 +233,8 @@ fn levels(file: &NetcdfFile, staggered: bool, place: Option<usize>) -> Result<Ve
         .zip(&mean_m)
         .flat_map(|(l, mean)| l.iter().map(move |h| (h - mean).abs()));
     let uneven_m = uneven_m.fold(0.0, f64::max);
-    let (ground_m, top_m) = (mean_m[0], mean_m[count - 1]);
+    let ground_m = mean_m[0];
+    let top_m = mean_m[count - 1];
     if uneven_m > LEVEL * (top_m - ground_m) {
         return Err(format!(
             "its levels rise and fall by {uneven_m:.1} m: bring it to levels of constant height first, e.g. by wrf-python's vinterp"

@@ -110,7 +110,8 @@ fn swept(map: &VelocityMap, sweep: usize) -> OutputResult<Swept<'_>> {
 /// # Errors
 /// A sweep that begins on one day and ends on the next, with both times.
 pub fn within_a_day(first_s: f64, last_s: f64, start: super::UtcTime) -> OutputResult<()> {
-    let (first, last) = (start.after_s(first_s), start.after_s(last_s));
+    let first = start.after_s(first_s);
+    let last = start.after_s(last_s);
     if first.date() == last.date() {
         return Ok(());
     }
@@ -193,7 +194,8 @@ fn second_of_day(map: &VelocityMap, ray: usize) -> f64 {
 fn start_time(map: &VelocityMap, ray: usize) -> String {
     let date = map.start().after_s(map.rays[ray].time_s).date();
     let s = second_of_day(map, ray);
-    let (h, m) = ((s / 3600.0) as u32, (s / 60.0) as u32 % 60);
+    let h = (s / 3600.0) as u32;
+    let m = (s / 60.0) as u32 % 60;
     // Hundredths are cut, not rounded: 59.999 s must not become 60.00.
     let rest = ((s % 60.0) * 100.0).floor() / 100.0;
     format!(

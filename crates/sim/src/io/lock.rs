@@ -118,7 +118,8 @@ mod tests {
     #[test]
     fn links_that_are_named_like_stages_are_not_followed() {
         use std::os::unix::fs::symlink;
-        let (temp, others) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let temp = tempfile::tempdir().unwrap();
+        let others = tempfile::tempdir().unwrap();
         for part in ["old", "new"] {
             fs::create_dir(others.path().join(part)).unwrap();
             fs::write(others.path().join(part).join("map.csv"), part).unwrap();
@@ -167,7 +168,8 @@ mod tests {
     #[test]
     fn what_a_living_writer_has_begun_stays_and_links_are_not_followed() {
         let temp = tempfile::tempdir().unwrap();
-        let (folder, elsewhere) = (temp.path().join("out"), temp.path().join("elsewhere"));
+        let folder = temp.path().join("out");
+        let elsewhere = temp.path().join("elsewhere");
         for of in [&folder, &elsewhere.join("new"), &elsewhere.join("old")] {
             fs::create_dir_all(of).unwrap();
         }

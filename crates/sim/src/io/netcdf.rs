@@ -226,7 +226,8 @@ impl Layout {
             parts.push((0, self.head(&sizes, &begins)));
         }
         for (variable, begin) in self.variables.into_iter().zip(begins) {
-            let (each, mut bytes) = (variable.data.width, variable.data.bytes);
+            let each = variable.data.width;
+            let mut bytes = variable.data.bytes;
             // Behind bytes the value that the library of NetCDF stores where nothing was written.
             let padding = if variable.data.code == 1 {
                 (-127_i8) as u8
@@ -275,7 +276,8 @@ impl Layout {
                     name: name.clone(),
                 });
             }
-            let (found, expected) = (variable.data.len(), self.count(variable));
+            let found = variable.data.len();
+            let expected = self.count(variable);
             let axes = variable.dims.join(" x ");
             match variable.first {
                 Some(first) if first + found <= expected => {}

@@ -117,7 +117,8 @@ impl NetcdfFile {
             .map(|place| dims[*place].to_owned())
             .collect();
         if let Some(missing) = places.iter().position(Option::is_none) {
-            let (role, count) = (roles[missing], dims.len());
+            let role = roles[missing];
+            let count = dims.len();
             let known = spare.iter().find_map(|dim| presentable(dim));
             let rename = known.map_or(String::new(), |dim| {
                 format!(

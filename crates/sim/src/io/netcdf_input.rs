@@ -120,7 +120,8 @@ pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
     if beginning[0] == b'C' && root.variables.iter().any(is_cut) {
         return Err(unsound());
     }
-    let (variables, attributes) = (root.variables.clone(), root.attributes.clone());
+    let variables = root.variables.clone();
+    let attributes = root.attributes.clone();
     Ok(NetcdfFile {
         path: path.to_owned(),
         file: Arc::new(file),
@@ -308,7 +309,8 @@ impl NetcdfFile {
         if !is_number {
             return Err(format!("variable {name} is not made of numbers"));
         }
-        let (mut lengths, mut part) = (variable.shape(), NcSliceInfo::all(variable.ndim()));
+        let mut lengths = variable.shape();
+        let mut part = NcSliceInfo::all(variable.ndim());
         for (at, range) in ranges.iter().enumerate() {
             match lengths.get_mut(at) {
                 Some(length) if range.end <= *length => *length = range.end - range.start,
@@ -357,7 +359,8 @@ impl NetcdfFile {
             ));
         }
         for attribute in &variable.attributes {
-            let (name, value) = (attribute.name.as_str(), &attribute.value);
+            let name = attribute.name.as_str();
+            let value = &attribute.value;
             let is_known = match name {
                 "_Unsigned" => text(value).is_none_or(|text| {
                     text.eq_ignore_ascii_case("true") || text.eq_ignore_ascii_case("false")

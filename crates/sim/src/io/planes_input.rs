@@ -75,7 +75,8 @@ fn planes(file: &NetcdfFile) -> Result<CrossPlanes, String> {
         return Err("v and w have not the same dimensions".into());
     }
     let [time, z, y] = &dims;
-    let (z_m, y_m) = (file.coordinate_m(z)?, file.coordinate_m(y)?);
+    let z_m = file.coordinate_m(z)?;
+    let y_m = file.coordinate_m(y)?;
     let [tau, time_s] = times(file, time)?;
     let shape = (tau.len(), z_m.len(), y_m.len());
     let component = |name: &str| -> Result<Array3<f64>, String> {
@@ -86,8 +87,10 @@ fn planes(file: &NetcdfFile) -> Result<CrossPlanes, String> {
         Array3::from_shape_vec(shape, values)
             .map_err(|_| format!("{name} has not the lengths of its coordinates"))
     };
-    let (v_m_s, w_m_s) = (component("v")?, component("w")?);
-    let (y_edges, z_edges) = (ends(file, y)?, ends(file, z)?);
+    let v_m_s = component("v")?;
+    let w_m_s = component("w")?;
+    let y_edges = ends(file, y)?;
+    let z_edges = ends(file, z)?;
     let planes = CrossPlanes {
         title: String::new(),
         tau,

@@ -6,7 +6,8 @@ use ndarray::{Array2, Array3};
 
 /// Two sweeps of 6 rays, 5 gates; NaN in a corner.
 pub(crate) fn map() -> VelocityMap {
-    let (per_sweep, gates) = (6, 5);
+    let per_sweep = 6;
+    let gates = 5;
     let mut rays = Vec::new();
     for sweep in 0..2 {
         for i in 0..per_sweep {

@@ -67,10 +67,8 @@ pub fn parse(text: &str) -> Result<Vec<Stop>, String> {
 
 /// Angles, rad, of a line such as `340.004090.000`.
 fn step_stare(line: &str) -> Option<[f64; 2]> {
-    let (azimuth, elevation) = (
-        line.get(..7)?,
-        line.get(7..14).filter(|_| line.len() == 14)?,
-    );
+    let azimuth = line.get(..7)?;
+    let elevation = line.get(7..14).filter(|_| line.len() == 14)?;
     let angle = |text: &str| {
         let digits = text
             .bytes()
@@ -102,7 +100,8 @@ fn table(table: &TextTable) -> Result<Vec<Stop>, String> {
         (Some(_), Some(_)) => Err(format!("{name}_rad and {name}_deg: one of them")),
         (None, None) => Err(format!("no column {name}_rad or {name}_deg")),
     };
-    let ((azimuth, in_degrees), (elevation, also)) = (angle("azimuth")?, angle("elevation")?);
+    let (azimuth, in_degrees) = angle("azimuth")?;
+    let (elevation, also) = angle("elevation")?;
     if in_degrees != also {
         return Err(
             "azimuth and elevation are in different units: both in _rad, or both in _deg".into(),
@@ -114,7 +113,8 @@ fn table(table: &TextTable) -> Result<Vec<Stop>, String> {
         1.0
     };
     let number = |row: usize, at: usize, low: f64, high: f64| -> Result<f64, String> {
-        let (value, name) = (table.number(row, at), &table.header[at]);
+        let value = table.number(row, at);
+        let name = &table.header[at];
         let cell = &table.rows[row][at];
         let good = (low..=high).contains(&value);
         if good {
@@ -134,10 +134,8 @@ fn table(table: &TextTable) -> Result<Vec<Stop>, String> {
             _ => Err(format!("columns {}: all three or none", names.join(", "))),
         }
     };
-    let (place, velocity) = (
-        triple(["x_m", "y_m", "z_m"])?,
-        triple(["u_m_s", "v_m_s", "w_m_s"])?,
-    );
+    let place = triple(["x_m", "y_m", "z_m"])?;
+    let velocity = triple(["u_m_s", "v_m_s", "w_m_s"])?;
     let mut out: Vec<Stop> = Vec::with_capacity(table.rows.len());
     for row in 0..table.rows.len() {
         let up = 90f64.to_radians() / unit;

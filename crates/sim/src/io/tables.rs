@@ -41,7 +41,8 @@ pub fn map_table(map: &VelocityMap) -> OutputResult<Table> {
 /// What [`CrossPlanes::check`] finds.
 pub fn planes_table(planes: &CrossPlanes) -> OutputResult<Table> {
     planes.check()?;
-    let (ny, nz) = (planes.y_m.len(), planes.z_m.len());
+    let ny = planes.y_m.len();
+    let nz = planes.z_m.len();
     let cells = || 0..planes.tau.len() * nz * ny;
     Ok(Table::new()
         .float("tau", cells().map(|i| planes.tau[i / (nz * ny)]))
@@ -69,13 +70,15 @@ mod tests {
     fn a_map_row_holds_the_value_and_place_of_its_cell() {
         let map = samples::map();
         let table = map_table(&map).unwrap();
-        let (ray, gate) = (7, 3);
+        let ray = 7;
+        let gate = 3;
         let row = ray * map.range_m.len() + gate;
         assert_eq!(
             floats(&table, "v_mean_m_s")[row],
             map.field("radial_velocity").unwrap().values[[ray, gate]]
         );
-        let (y, z) = (floats(&table, "y_m")[row], floats(&table, "z_m")[row]);
+        let y = floats(&table, "y_m")[row];
+        let z = floats(&table, "z_m")[row];
         let range = (y - map.lidar_y_m).hypot(z - map.lidar_height_m);
         approx::assert_relative_eq!(range, map.range_m[gate], max_relative = 1e-14);
         approx::assert_relative_eq!(
@@ -111,7 +114,8 @@ mod tests {
     fn planes_run_fastest_along_y() {
         let planes = samples::planes();
         let table = planes_table(&planes).unwrap();
-        let (ny, nz) = (planes.y_m.len(), planes.z_m.len());
+        let ny = planes.y_m.len();
+        let nz = planes.z_m.len();
         let row = (ny * nz) + 2 * ny + 3;
         assert_eq!(floats(&table, "w_m_s")[row], planes.w_m_s[[1, 2, 3]]);
         assert_eq!(floats(&table, "y_m")[row], planes.y_m[3]);

@@ -74,7 +74,9 @@ fn product(text: &str) -> Option<(f64, [i32; 3])> {
         .replace('¹', "1")
         .replace('/', " / ")
         .replace(['.', '*', '_', '·'], " ");
-    let (mut factor, mut powers, mut sign) = (1.0_f64, [0; 3], 1);
+    let mut factor = 1.0_f64;
+    let mut powers = [0; 3];
+    let mut sign = 1;
     for word in spaced.split_whitespace() {
         if word == "/" || word == "per" {
             sign = -1;

@@ -186,7 +186,8 @@ mod tests {
             "2023-12-31T23:59:59Z"
         );
         // Every day of three centuries is the one after the day before, and comes back.
-        let (mut day, last) = (at("1900-01-01T00:00:00Z"), at("2199-12-31T00:00:00Z"));
+        let mut day = at("1900-01-01T00:00:00Z");
+        let last = at("2199-12-31T00:00:00Z");
         let mut count = 1;
         while day < last {
             let next = day.after_s(DAY_S);

@@ -66,7 +66,9 @@ impl<T: Debug, W: ToString> Is<T, W> {
 
 impl Limit<f64> for RangeInclusive<f64> {
     fn hold(&self, key: &str, value: &f64, c: &mut Checker<'_>) {
-        let (low, high, unit) = (self.start(), self.end(), unit_of(key).unwrap_or_default());
+        let low = self.start();
+        let high = self.end();
+        let unit = unit_of(key).unwrap_or_default();
         c.require(
             self.contains(value),
             key,

@@ -311,7 +311,8 @@ impl Walk<'_> {
         let default = |name: &str| defaults.and_then(|d| d.get(name));
         let mut out = toml::Table::new();
         for (name, value) in table {
-            let (here, line) = (name.get_ref().as_ref(), self.document.line_of(&name.span()));
+            let here = name.get_ref().as_ref();
+            let line = self.document.line_of(&name.span());
             match keys.iter().find(|key| key.name == here) {
                 Some(key) => {
                     let defaults = default(here).and_then(Value::as_table);
@@ -380,10 +381,8 @@ impl Walk<'_> {
                 // Each value that does not fit is named itself.
                 let mut list = Vec::with_capacity(values.len());
                 for (i, value) in values.iter().enumerate() {
-                    let (path, line) = (
-                        &format!("{}[{i}]", at.path),
-                        self.document.line_of(&value.span()),
-                    );
+                    let path = &format!("{}[{i}]", at.path);
+                    let line = self.document.line_of(&value.span());
                     list.extend(self.value(
                         of,
                         value,
@@ -473,7 +472,8 @@ impl Walk<'_> {
                 .map(|(name, _)| format!("\"{name}\""))
                 .collect();
             if !others.is_empty() {
-                let (tag, needed) = (join(path, tag), others.join(" or "));
+                let tag = join(path, tag);
+                let needed = others.join(" or ");
                 let stated = if self.document.value(&tag).is_some() {
                     ""
                 } else {

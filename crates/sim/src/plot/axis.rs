@@ -51,10 +51,8 @@ impl Axis {
             if low < high && usable(&low) && usable(&high) {
                 return Ok((low, high));
             }
-            let (name, range) = (
-                format!("range of axis '{}'", self.label),
-                format!("{low} to {high}"),
-            );
+            let name = format!("range of axis '{}'", self.label);
+            let range = format!("{low} to {high}");
             return Err(OutputError::value(
                 name,
                 range,
@@ -157,8 +155,10 @@ impl Scale<'_> {
     }
 
     fn log_ticks(&self, count: f64) -> Vec<Tick> {
-        let (low, high) = (self.range.0.log10(), self.range.1.log10());
-        let (first, last) = ((low - 1e-9).ceil() as i32, (high + 1e-9).floor() as i32);
+        let low = self.range.0.log10();
+        let high = self.range.1.log10();
+        let first = (low - 1e-9).ceil() as i32;
+        let last = (high + 1e-9).floor() as i32;
         let step = (((high - low) / count).ceil() as i32).max(1);
         let factors: &[f64] = if high - low < 2.0 {
             &[1.0, 2.0, 5.0]

@@ -82,7 +82,8 @@ fn sequential(t: f64) -> Rgb {
 
 fn from_oklch(lightness: f64, chroma: f64, hue_deg: f64) -> Rgb {
     let hue = hue_deg.to_radians();
-    let (a, b) = (chroma * hue.cos(), chroma * hue.sin());
+    let a = chroma * hue.cos();
+    let b = chroma * hue.sin();
     let l = (lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b).powi(3);
     let m = (lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b).powi(3);
     let s = (lightness - 0.089_484_177_5 * a - 1.291_485_548_0 * b).powi(3);
@@ -123,7 +124,8 @@ mod tests {
     fn the_diverging_map_is_symmetric_and_blue_is_negative() {
         let map = ColourMap::Diverging { limit: 8.0 };
         for v in [0.5, 2.0, 4.0, 8.0] {
-            let (down, up) = (map.colour(-v), map.colour(v));
+            let down = map.colour(-v);
+            let up = map.colour(v);
             assert!(down[2] > down[0] && up[0] > up[2], "{v}: {down:?} {up:?}");
             let ratio = (luminance(down) + 0.05) / (luminance(up) + 0.05);
             assert!(

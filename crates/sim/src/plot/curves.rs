@@ -94,7 +94,8 @@ impl CurvePlot {
             let unit =
                 ((x_range.1 - x_range.0) / frame.width).max((y_range.1 - y_range.0) / frame.height);
             for (range, length) in [(&mut x_range, frame.width), (&mut y_range, frame.height)] {
-                let (middle, half) = (0.5 * (range.0 + range.1), 0.5 * unit * length);
+                let middle = 0.5 * (range.0 + range.1);
+                let half = 0.5 * unit * length;
                 *range = (middle - half, middle + half);
             }
         }
@@ -139,7 +140,8 @@ impl CurvePlot {
 
     /// The curves on the paper, and where their ink is.
     fn content(&self, x: &Scale<'_>, y: &Scale<'_>) -> (Vec<Shape>, Vec<(f64, f64)>) {
-        let (mut content, mut occupied) = (Vec::new(), Vec::new());
+        let mut content = Vec::new();
+        let mut occupied = Vec::new();
         for (colour, series) in self.coloured() {
             let points: Vec<_> = series
                 .points
@@ -168,7 +170,8 @@ impl CurvePlot {
 fn along(points: &[(f64, f64)], joined: bool) -> Vec<(f64, f64)> {
     let mut out: Vec<(f64, f64)> = points.iter().copied().filter(finite).collect();
     for pair in pieces(points).filter(|_| joined).flat_map(|s| s.windows(2)) {
-        let (dx, dy) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
+        let dx = pair[1].0 - pair[0].0;
+        let dy = pair[1].1 - pair[0].1;
         let steps = (dx.hypot(dy) / 8.0).min(400.0) as usize;
         out.extend(
             (1..steps)
@@ -301,10 +304,8 @@ impl Series {
         } else {
             // One polygon for a stretch without gap: forth along the upper edge, back along the lower.
             for stretch in bands.filter(|stretch| stretch.len() > 1) {
-                let (upper, lower) = (
-                    stretch.iter().map(|b| (b.0, b.2)),
-                    stretch.iter().rev().map(|b| (b.0, b.1)),
-                );
+                let upper = stretch.iter().map(|b| (b.0, b.2));
+                let lower = stretch.iter().rev().map(|b| (b.0, b.1));
                 out.push(Shape::Area {
                     points: upper.chain(lower).collect(),
                     fill,
@@ -388,10 +389,8 @@ fn draw_legend(series: &[(usize, &Series)], place: Frame, out: &mut Vec<Shape>) 
     });
     out.push(Shape::line(place.outline(), GRID, 1.0));
     for (row, (colour, series)) in series.iter().enumerate() {
-        let (x, y) = (
-            place.left + PAD,
-            place.top + 0.5 * PAD + LINE * (row as f64 + 0.5),
-        );
+        let x = place.left + PAD;
+        let y = place.top + 0.5 * PAD + LINE * (row as f64 + 0.5);
         if series.style.has_line() {
             out.push(Shape::Line {
                 points: vec![(x, y), (x + SAMPLE, y)],
@@ -526,7 +525,8 @@ mod tests {
         let Shape::Line { points, .. } = &content(&plot)[0] else {
             panic!("no line")
         };
-        let (dx, dy) = (points[1].0 - points[0].0, points[0].1 - points[1].1);
+        let dx = points[1].0 - points[0].0;
+        let dy = points[0].1 - points[1].1;
         approx::assert_relative_eq!(dx / 100.0, dy / 40.0, max_relative = 1e-12);
     }
 

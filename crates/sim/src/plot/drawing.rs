@@ -26,7 +26,10 @@ impl Frame {
 
     /// Once round and along the first side again, so that a line along it has its joint at every corner.
     pub(crate) fn outline(&self) -> Vec<(f64, f64)> {
-        let (l, t, r, b) = (self.left, self.top, self.right(), self.bottom());
+        let l = self.left;
+        let t = self.top;
+        let r = self.right();
+        let b = self.bottom();
         vec![(l, t), (r, t), (r, b), (l, b), (l, t), (r, t)]
     }
 }

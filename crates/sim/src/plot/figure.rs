@@ -142,7 +142,8 @@ impl Figure {
             ));
         }
         let font = Font::load()?;
-        let (mut shapes, mut top) = (Vec::new(), MARGIN);
+        let mut shapes = Vec::new();
+        let mut top = MARGIN;
         if !self.title.is_empty() {
             shapes.push(title((self.width / 2.0, top + 22.0), &self.title, 20.0));
             top += TITLE_ROOM;
@@ -221,7 +222,8 @@ mod tests {
 
     #[test]
     fn both_formats_are_the_same_twice() {
-        let (figure, origin) = (figure(), example());
+        let figure = figure();
+        let origin = example();
         let svg = figure.svg(&origin).unwrap();
         assert_eq!(svg, figure.svg(&origin).unwrap());
         assert_eq!(

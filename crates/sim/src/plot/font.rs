@@ -25,7 +25,8 @@ impl Font {
 
     /// Outlines of a text that begins at the origin.
     pub(crate) fn outline(&self, text: &str, size: f64) -> Option<Path> {
-        let (mut out, mut x) = (PathBuilder::new(), 0.0);
+        let mut out = PathBuilder::new();
+        let mut x = 0.0;
         for (glyph, width, scale, rise) in self.letters(text, size) {
             let mut pen = Pen(PathBuilder::new());
             self.face.outline_glyph(glyph, &mut pen);

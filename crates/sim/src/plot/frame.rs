@@ -129,16 +129,15 @@ pub(crate) fn axis(side: Side, scale: &Scale<'_>, f: &Frame, font: &Font, out: &
         ));
         out.push(Shape::text(label, &name, TICK_SIZE, anchor));
     }
-    let (middle, beyond) = (
-        (f.left + f.width / 2.0, f.top + f.height / 2.0),
-        TICK_LENGTH + widest,
-    );
+    let middle = (f.left + f.width / 2.0, f.top + f.height / 2.0);
+    let beyond = TICK_LENGTH + widest;
     let at = match side {
         Side::Bottom => (middle.0, f.bottom() + BOTTOM - 14.0),
         Side::Left => (f.left - beyond - 18.0, middle.1),
         Side::Right => (f.right() + beyond + 24.0, middle.1),
     };
-    let (upward, anchor) = (side != Side::Bottom, Anchor::Middle);
+    let upward = side != Side::Bottom;
+    let anchor = Anchor::Middle;
     out.push(Shape::Text(Text {
         at,
         text: scale.label.into(),

@@ -70,7 +70,8 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 impl IsosurfacePlot {
     fn camera(&self) -> Camera {
         let [(sa, ca), (se, ce)] = self.view_rad.map(f64::sin_cos);
-        let (right, up) = ([-sa, ca, 0.0], [-se * ca, -se * sa, ce]);
+        let right = [-sa, ca, 0.0];
+        let up = [-se * ca, -se * sa, ce];
         let range_m = [right, up]
             .map(|axis| extremes(self.corners_m().into_iter().map(|corner| dot(corner, axis))));
         Camera {
@@ -120,10 +121,8 @@ impl IsosurfacePlot {
         let [left_m, low_m] = camera.range_m.map(|range| range.0);
         let corners_m = self.corners_m();
         let corners = corners_m.map(|at_m| {
-            let (x_m, y_m) = (
-                dot(at_m, camera.right) - left_m,
-                dot(at_m, camera.up) - low_m,
-            );
+            let x_m = dot(at_m, camera.right) - left_m;
+            let y_m = dot(at_m, camera.up) - low_m;
             (frame.left + scale * x_m, frame.bottom() - scale * y_m)
         });
         // Of each edge the axis that it lies along, and its ends.
@@ -165,7 +164,8 @@ impl IsosurfacePlot {
         // Names and ends of the axes at the lowest edges in the picture, of the vertical one at the leftmost; edges that share a corner
         // keep apart.
         let along = |(_, a, b): &(usize, usize, usize), share: f64| {
-            let (a, b) = (corners[*a], corners[*b]);
+            let a = corners[*a];
+            let b = corners[*b];
             (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1))
         };
         for (d, name) in ["x", "y", "z"].into_iter().enumerate() {
@@ -190,7 +190,8 @@ impl IsosurfacePlot {
             }
         }
         for (row, surface) in self.surfaces.iter().enumerate() {
-            let (left, bottom) = (frame.left + 4.0, frame.top + 14.0 + 18.0 * row as f64);
+            let left = frame.left + 4.0;
+            let bottom = frame.top + 14.0 + 18.0 * row as f64;
             let points = Frame {
                 left,
                 top: bottom - 9.0,
@@ -222,7 +223,8 @@ impl IsosurfacePlot {
             .par_iter_mut()
             .enumerate()
             .for_each(|(place, pixel)| {
-                let (row, column) = (place / width as usize, place % width as usize);
+                let row = place / width as usize;
+                let column = place % width as usize;
                 let [(left_m, _), (_, top_m)] = camera.range_m;
                 let [across_m, up_m] = camera.size_m();
                 let a = left_m + (column as f64 + 0.5) / f64::from(width) * across_m;
@@ -330,7 +332,8 @@ impl Volume {
     /// The interpolant of a cell; positions outside are moved to its nearest face.
     fn within(&self, cell: [usize; 3], at_m: [f64; 3]) -> f64 {
         let part = |d: usize| {
-            let (low, high) = (self.axis_m[d][cell[d]], self.axis_m[d][cell[d] + 1]);
+            let low = self.axis_m[d][cell[d]];
+            let high = self.axis_m[d][cell[d] + 1];
             ((at_m[d] - low) / (high - low)).clamp(0.0, 1.0)
         };
         let between = |a: f64, b: f64, part: f64| a + part * (b - a);
@@ -360,10 +363,8 @@ impl Volume {
                 }
                 continue;
             }
-            let (a, b) = (
-                (low[d] - from_m[d]) / along[d],
-                (high[d] - from_m[d]) / along[d],
-            );
+            let a = (low[d] - from_m[d]) / along[d];
+            let b = (high[d] - from_m[d]) / along[d];
             span = (span.0.max(a.min(b)), span.1.min(a.max(b)));
         }
         (span.0 < span.1).then_some(span)
@@ -403,7 +404,8 @@ impl Volume {
                     }
                 }
             }
-            let (through, last) = (leaves.1, self.axis_m[leaves.1].len() - 2);
+            let through = leaves.1;
+            let last = self.axis_m[leaves.1].len() - 2;
             match along[through] > 0.0 {
                 true if cell[through] < last => cell[through] += 1,
                 false if cell[through] > 0 => cell[through] -= 1,
@@ -426,7 +428,8 @@ impl Volume {
         let steps =
             (0..STEPS).flat_map(|step| levels.iter().enumerate().map(move |level| (step, level)));
         let crossing = |(step, (level, &wanted)): (u32, (usize, &f64))| {
-            let (mut low, mut high) = (place(step), place(step + 1));
+            let mut low = place(step);
+            let mut high = place(step + 1);
             let below = is_below(low, wanted);
             if below == is_below(high, wanted) {
                 return None;
@@ -451,7 +454,8 @@ impl Volume {
         let cell = self.cell(at_m);
         let slope: [f64; 3] = std::array::from_fn(|d| {
             let reach_m = self.axis_m[d][cell[d] + 1] - self.axis_m[d][cell[d]];
-            let (mut low, mut high) = (at_m, at_m);
+            let mut low = at_m;
+            let mut high = at_m;
             (low[d], high[d]) = (low[d] - reach_m, high[d] + reach_m);
             (self.at(low) - self.at(high)) / reach_m
         });

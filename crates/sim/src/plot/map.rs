@@ -220,7 +220,8 @@ impl MapPlot {
     fn push_marks(&self, x: &Scale<'_>, y: &Scale<'_>, out: &mut Vec<Shape>) {
         if let Some(lidar_m) = self.shown_lidar_m() {
             // A tripod on the ground, large enough to be seen when the telescope is low.
-            let (at, ground) = (x.place(lidar_m.0), y.place(0.0));
+            let at = x.place(lidar_m.0);
+            let ground = y.place(0.0);
             let apex = (at, y.place(lidar_m.1).min(ground - 13.0));
             out.push(Shape::area(
                 [apex, (at - 8.0, ground), (at + 8.0, ground)],
@@ -234,7 +235,8 @@ impl MapPlot {
             ));
         }
         for p in &self.points_m {
-            let (px, py) = (x.place(p.0), y.place(p.1));
+            let px = x.place(p.0);
+            let py = y.place(p.1);
             for (colour, width) in [([255, 255, 255], 4.5), (INK, 2.0)] {
                 let arm =
                     |d: f64| Shape::line([(px - 7.0, py - d), (px + 7.0, py + d)], colour, width);
@@ -368,9 +370,11 @@ impl Cells {
     }
 
     fn index(&self, y_m: f64, z_m: f64) -> Option<usize> {
-        let (mut first, mut second) = (y_m, z_m);
+        let mut first = y_m;
+        let mut second = z_m;
         if let Some(lidar_m) = self.lidar_m {
-            let (dy, dz) = (y_m - lidar_m.0, z_m - lidar_m.1);
+            let dy = y_m - lidar_m.0;
+            let dz = z_m - lidar_m.1;
             (first, second) = (dy.hypot(dz), dz.atan2(dy));
             // A full turn may begin anywhere.
             if self.second_edge.first().is_some_and(|edge| second < *edge) {
@@ -606,10 +610,8 @@ mod cells_tests {
             .pixels((0.0, 30.0), (0.0, 30.0), (300, 300), &colours)
             .unwrap();
         let pixel = |range: f64, angle: f64| {
-            let (column, row) = (
-                range * angle.cos() * 10.0,
-                299.0 - range * angle.sin() * 10.0,
-            );
+            let column = range * angle.cos() * 10.0;
+            let row = 299.0 - range * angle.sin() * 10.0;
             let at = picture.pixel(column as u32, row as u32).unwrap();
             [at.red(), at.green(), at.blue(), at.alpha()]
         };

@@ -161,7 +161,8 @@ fn ink([r, g, b]: Rgb, opacity: f64) -> Paint<'static> {
 fn path(points: &[(f64, f64)]) -> Option<Path> {
     let mut builder = PathBuilder::with_capacity(points.len(), points.len());
     for (i, (x, y)) in points.iter().enumerate() {
-        let (x, y) = (*x as f32, *y as f32);
+        let x = *x as f32;
+        let y = *y as f32;
         if i == 0 {
             builder.move_to(x, y)
         } else {
@@ -281,7 +282,8 @@ mod tests {
             [255, 255, 255],
             "cut by the clip frame"
         );
-        let (top, bottom) = (pixel(&raster, 20.0, 43.0), pixel(&raster, 20.0, 57.0));
+        let top = pixel(&raster, 20.0, 43.0);
+        let bottom = pixel(&raster, 20.0, 57.0);
         assert!(top[0] > 200 && bottom[2] > 200, "{top:?} {bottom:?}");
     }
 

@@ -14,7 +14,8 @@ const FAMILY: &str = "Ubuntu, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif";
 
 /// The whole file.
 pub(crate) fn svg_text(drawing: &Drawing, provenance: &Provenance) -> OutputResult<String> {
-    let (w, h) = (number(drawing.width), number(drawing.height));
+    let w = number(drawing.width);
+    let h = number(drawing.height);
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" font-family=\"{FAMILY}\">\n<metadata>\n"
     );
@@ -47,7 +48,9 @@ pub fn escape(text: &str) -> String {
 fn element(shape: &Shape) -> OutputResult<String> {
     Ok(match shape {
         Shape::Line { points, pen } => {
-            let (points, colour, width) = (pairs(points), hex(pen.colour), number(pen.width));
+            let points = pairs(points);
+            let colour = hex(pen.colour);
+            let width = number(pen.width);
             let mut dash = pen
                 .dash
                 .iter()
@@ -66,15 +69,15 @@ fn element(shape: &Shape) -> OutputResult<String> {
             fill,
             opacity,
         } => {
-            let (points, colour, opacity) = (pairs(points), hex(*fill), number(*opacity));
+            let points = pairs(points);
+            let colour = hex(*fill);
+            let opacity = number(*opacity);
             format!("<polygon points=\"{points}\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>\n")
         }
         Shape::Text(text) => text_element(text),
         Shape::Image { frame, pixels } => {
-            let (place, data) = (
-                place(frame),
-                STANDARD.encode(encode([Ok(pixels.clone())], 0.0, None)?),
-            );
+            let place = place(frame);
+            let data = STANDARD.encode(encode([Ok(pixels.clone())], 0.0, None)?);
             format!(
                 "<image {place} preserveAspectRatio=\"none\" href=\"data:image/png;base64,{data}\"/>\n"
             )
@@ -97,8 +100,10 @@ fn element(shape: &Shape) -> OutputResult<String> {
 }
 
 fn text_element(text: &Text) -> String {
-    let (x, y) = (number(text.at.0), number(text.at.1));
-    let (size, colour) = (number(text.size), hex(super::drawing::INK));
+    let x = number(text.at.0);
+    let y = number(text.at.1);
+    let size = number(text.size);
+    let colour = hex(super::drawing::INK);
     let anchor = match text.anchor {
         Anchor::Start => "start",
         Anchor::Middle => "middle",
@@ -115,10 +120,8 @@ fn text_element(text: &Text) -> String {
     );
     let mut height = 0.0;
     for run in runs(&text.text) {
-        let (shift, size) = (
-            number(text.size * (height - run.rise)),
-            number(text.size * run.scale),
-        );
+        let shift = number(text.size * (height - run.rise));
+        let size = number(text.size * run.scale);
         height = run.rise;
         out += &match run.scale == 1.0 && shift == "0" {
             true => escape(run.text),

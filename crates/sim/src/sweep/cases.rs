@@ -282,9 +282,11 @@ impl<'a> Grid<'a> {
     }
 
     fn cases(&self) -> Result<Vec<Case>, Error> {
-        let (mut cases, mut refusals) = (Vec::new(), Vec::new());
+        let mut cases = Vec::new();
+        let mut refusals = Vec::new();
         for (combination, row) in self.rows.iter().enumerate() {
-            let (index, mut values) = (cases.len(), Vec::new());
+            let index = cases.len();
+            let mut values = Vec::new();
             match self.scene(row, index, &mut values) {
                 Ok(scene) => cases.extend(scene.map(|scene| Case {
                     index,
@@ -409,9 +411,11 @@ fn axis(word: &str) -> Result<Axis, Problem> {
     let (name, text) = word
         .split_once('=')
         .ok_or_else(|| problem("--vary", word, example))?;
-    let (name, text) = (name.trim(), text.trim());
+    let name = name.trim();
+    let text = text.trim();
     let column = Column::named(name, text, false)?;
-    let (key, is_numeric) = (&column.key, column.shown.holds != Holds::Texts);
+    let key = &column.key;
+    let is_numeric = column.shown.holds != Holds::Texts;
     if text.is_empty() {
         return Err(problem(
             name,

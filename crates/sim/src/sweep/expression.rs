@@ -149,7 +149,8 @@ impl Parser<'_> {
                 .map(|_| inner)
                 .ok_or_else(|| self.wrong("a closing bracket"));
         }
-        let (here, bytes) = (self.rest, self.rest.as_bytes());
+        let here = self.rest;
+        let bytes = self.rest.as_bytes();
         let split = |belongs: &dyn Fn(usize, u8) -> bool| {
             let end = bytes.iter().enumerate().position(|(i, b)| !belongs(i, *b));
             here.split_at(end.unwrap_or(bytes.len()))

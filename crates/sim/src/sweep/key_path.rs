@@ -54,7 +54,8 @@ fn all() -> &'static [SceneKey] {
 
 /// Whether the tables that `short` names stand in this order in `path`, the first first, before the same last name.
 fn shortens(short: &str, path: &str) -> bool {
-    let (mut rest, mut whole) = (short.split('.').peekable(), path.split('.'));
+    let mut rest = short.split('.').peekable();
+    let mut whole = path.split('.');
     let is_begun = rest.next() == whole.next();
     let last = whole.fold("", |_, part| {
         rest.next_if_eq(&part);
@@ -125,12 +126,10 @@ fn unknown(written: &str) -> String {
     let hint = meant
         .map(|path| format!("; did you mean {path}?"))
         .unwrap_or_default();
-    let (mut where_to_look, mut known) = (
-        "Known there",
-        paths()
-            .filter(|path| of(path) == section)
-            .collect::<Vec<_>>(),
-    );
+    let mut where_to_look = "Known there";
+    let mut known = paths()
+        .filter(|path| of(path) == section)
+        .collect::<Vec<_>>();
     if known.is_empty() {
         (where_to_look, known) = ("Sections", paths().map(of).collect());
         known.dedup();

@@ -114,7 +114,8 @@ fn against(
     );
     plot.shape = 0.6;
     let error = standard_error_of(result, results().map(|(name, ..)| name));
-    let (curves, mut any) = (curves(definition, rows, key), false);
+    let curves = curves(definition, rows, key);
+    let mut any = false;
     // Without a name either no other key varies, or there are too many curves.
     let curves_are_whole = definition.free().count() == 1;
     for (colour, (curve, members)) in curves.iter().enumerate() {

@@ -92,14 +92,14 @@ pub(super) fn rows(
 
 impl<'p> Collected<'p> {
     fn new(plan: &'p Plan, retrieval: Option<Retrieval<'p>>) -> Result<Self, Error> {
-        let (scene, g) = (&plan.scene.content, &plan.geometry);
+        let scene = &plan.scene.content;
+        let g = &plan.geometry;
         let distance =
             Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
-                let (elevation_rad, range_m) = (g.elevation_rad[i], g.gate_range_m[j]);
-                let (y_m, z_m) = (
-                    range_m * elevation_rad.cos(),
-                    scene.scan.lidar_height_m + range_m * elevation_rad.sin(),
-                );
+                let elevation_rad = g.elevation_rad[i];
+                let range_m = g.gate_range_m[j];
+                let y_m = range_m * elevation_rad.cos();
+                let z_m = scene.scan.lidar_height_m + range_m * elevation_rad.sin();
                 match &scene.flow {
                     Flow::VortexPair(pair) => {
                         let centres =
@@ -156,7 +156,8 @@ impl<'p> Collected<'p> {
     }
 
     fn row(&self, map: &VelocityEstimates, scanner: &Scanner<'_>) -> Result<Vec<f64>, Error> {
-        let (plan, scene) = (self.plan, &self.plan.scene.content);
+        let plan = self.plan;
+        let scene = &self.plan.scene.content;
         let middle =
             ScanMiddle::of(plan, None, Some(scanner)).ok_or(wakescope_estimate::Error::Empty {
                 field: "layers of a line",
@@ -202,7 +203,8 @@ impl<'p> Collected<'p> {
 /// Part of the estimates that say nothing of the air, and its standard error: those farther from it than any part of a peak, and
 /// as many of the others as a level floor over the band has there.
 fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
-    let (scene, pulse) = (&plan.scene.content, &plan.instrument.pulse);
+    let scene = &plan.scene.content;
+    let pulse = &plan.instrument.pulse;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let moment = |power: i32| {
         window
@@ -220,7 +222,8 @@ fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
         .hypot(0.25 * std::f64::consts::FRAC_1_PI / window_s);
     let part = (2.0 * BEYOND_WIDTHS * width_hz / scene.detector.bandwidth_hz).min(0.9);
     let limit_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz * part;
-    let (of, share) = (errors_m_s.len() as f64, 1.0 - part);
+    let of = errors_m_s.len() as f64;
+    let share = 1.0 - part;
     let beyond = errors_m_s
         .iter()
         .filter(|error| error.is_nan() || error.abs() > limit_m_s)

@@ -146,7 +146,8 @@ pub fn run<'s>(
         "forecast: {} of one core, to a factor of two",
         seconds(of_due_s)
     ));
-    let (mut signals, mut walls) = (0, Vec::new());
+    let mut signals = 0;
+    let mut walls = Vec::new();
     for group in groups(due.iter().map(|case| &case.scene)) {
         let planned = |&place: &usize| {
             let case: &'s Case = due[place];
@@ -194,7 +195,8 @@ pub fn run<'s>(
             existing,
         )?);
     }
-    let (flows, efficiencies) = (common.winds.len(), common.efficiencies.computed());
+    let flows = common.winds.len();
+    let efficiencies = common.efficiencies.computed();
     Ok(Summary {
         run: due.len(),
         kept: mine.len() - due.len(),
@@ -296,7 +298,8 @@ fn groups<'s>(scenes: impl Iterator<Item = &'s SceneFile>) -> Vec<Vec<usize>> {
             ..file.content.clone()
         };
         // Where pulses have airs of their own, a scan holds what they spread over at the gates.
-        let (e, of_pulses) = (&file.content.estimator, file.content.scan.wind_of_pulses);
+        let e = &file.content.estimator;
+        let of_pulses = file.content.scan.wind_of_pulses;
         let gates = (of_pulses != WindOfPulses::default())
             .then_some((e.window_samples, e.gate_step_samples));
         let cause = hash_of(&format!("{:?}", (signals, gates, file.folder())));

@@ -46,8 +46,8 @@ fn cases_are_the_stored_ones_to_the_last_bit() {
         for row in table.rows.iter().filter(|row| row[0] == *words) {
             let case = &found.cases[row[1].parse::<usize>().unwrap()];
             let place = found.keys().position(|key| key == row[2]).unwrap();
-            let (value, expected): (f64, f64) =
-                (case.values[place].parse().unwrap(), row[3].parse().unwrap());
+            let value: f64 = case.values[place].parse().unwrap();
+            let expected: f64 = row[3].parse().unwrap();
             assert_eq!(value.to_bits(), expected.to_bits(), "{row:?}");
             compared += 1;
         }

@@ -54,7 +54,8 @@ pub fn merge(
     let Some((definition, _)) = first else {
         return Err(refuse("at least one folder of a sweep is needed".into()));
     };
-    let (mut rows, mut missing) = (Vec::new(), Vec::new());
+    let mut rows = Vec::new();
+    let mut missing = Vec::new();
     for case in 0..definition.scene_hashes.len() {
         match folders
             .iter()

@@ -14,8 +14,10 @@ const JUDGES: &str = "velocity_standard_deviation rms standard_error level n_eff
 
 /// The map of a run in the form that files and pictures take.
 pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
-    let (scene, g) = (&plan.scene.content, &plan.geometry);
-    let (mount, lines) = (&g.schedule.mount, &g.schedule.lines);
+    let scene = &plan.scene.content;
+    let g = &plan.geometry;
+    let mount = &g.schedule.mount;
+    let lines = &g.schedule.lines;
     let (zero_rad, from_x_rad) = mount.reference_rad;
     let moves = lines
         .iter()
@@ -29,7 +31,8 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     let across = rhi && stands && (zero_rad, from_x_rad) == (scene.scan.azimuth_rad, FRAC_PI_2);
     let start_s = plan.wind.start_s;
     let away = |what: &str| format!("{what}, positive away from the lidar");
-    let (speed, one) = (Unit::METRE_PER_SECOND, Unit::ONE);
+    let speed = Unit::METRE_PER_SECOND;
+    let one = Unit::ONE;
     let field = |name: &str, unit, text: &str, values: &Array2<f64>| {
         Field::float(name, unit, text, values.clone())
     };

@@ -174,7 +174,8 @@ fn lines(plan: &Plan, map: &VelocityMap) -> Figure {
     );
     for line in 0..map.rays.len().min(5) {
         let ray = &map.rays[line];
-        let (azimuth, elevation) = (ray.azimuth_rad.to_degrees(), ray.elevation_rad.to_degrees());
+        let azimuth = ray.azimuth_rad.to_degrees();
+        let elevation = ray.elevation_rad.to_degrees();
         for (field, style, what) in [
             ("v_pulse", Style::Line, "air"),
             ("radial_velocity", Style::Markers, "estimate"),
@@ -242,7 +243,8 @@ const DRAWN_LINES: usize = 24;
 
 /// The set-up, from above and from behind: the lidar, each line from the first gate to the last, the ground and the vortices.
 pub(super) fn scan(plan: &Plan) -> Figure {
-    let (g, start_m) = (&plan.geometry, plan.geometry.schedule.mount.position_m);
+    let g = &plan.geometry;
+    let start_m = plan.geometry.schedule.mount.position_m;
     let ends = [g.gate_range_m.first(), g.gate_range_m.last()].map(|r| r.copied().unwrap_or(0.0));
     let lines = g.schedule.lines.len();
     // Along the flight, vortices and ground are drawn a little beyond the lidar and the farthest gates.
@@ -251,7 +253,8 @@ pub(super) fn scan(plan: &Plan) -> Figure {
         let with = |[low, high]: [f64; 2], at_m: f64| [low.min(at_m), high.max(at_m)];
         drawn.fold([start_m[axis] - least_m, start_m[axis] + least_m], with)
     };
-    let (x_m, y_m) = (spread_m(0, 0.2 * ends[1]), spread_m(1, 0.0));
+    let x_m = spread_m(0, 0.2 * ends[1]);
+    let y_m = spread_m(1, 0.0);
     let panel = |title: &str, label: &str, up: usize| {
         let mut plot = CurvePlot::new(
             title,

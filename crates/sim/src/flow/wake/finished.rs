@@ -43,7 +43,8 @@ impl FinishedWake {
         let (CaseKind::Wake(flow), Some(output)) = (&file.content.case, &file.content.wake) else {
             return Err(refuse("the case is no wake".into()));
         };
-        let (flow, output) = ((**flow).clone(), output.clone());
+        let flow = (**flow).clone();
+        let output = output.clone();
         let scales = flow.pair.scales().map_err(Error::Flow)?;
         let mut columns = table(&folder.join("wake.csv"))?;
         let scaled: Vec<(String, Vec<f64>)> = columns

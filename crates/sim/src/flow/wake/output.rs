@@ -63,7 +63,8 @@ impl WakeOutput {
 
     /// What is missing at the end, in a sentence.
     pub(in super::super) fn idle(&self) -> Option<String> {
-        let (end, every) = (self.end_tau, self.every_tau);
+        let end = self.end_tau;
+        let every = self.every_tau;
         let rows = end / every;
         ((rows - rows.round()).abs() > 1e-6).then(|| {
             format!(

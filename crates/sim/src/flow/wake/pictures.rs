@@ -107,7 +107,8 @@ impl FinishedWake {
         figure.width = 1200.0;
         let mut pictures = vec![("wake", figure)];
         pictures.extend(self.surfaces_figure()?.map(|figure| ("surfaces", figure)));
-        let (mut group, origin) = (FileGroup::new(&self.folder), self.file.provenance());
+        let mut group = FileGroup::new(&self.folder);
+        let origin = self.file.provenance();
         for (name, figure) in &pictures {
             figure.add_to(&mut group, name, &origin)?;
         }
@@ -140,7 +141,8 @@ impl FinishedWake {
                 nodes_m: [x, y, z],
                 values,
             } = read_scalar(&place, "vorticity_magnitude")?;
-            let (scales, unit_per_s) = (self.scales, self.scales.vorticity_per_s());
+            let scales = self.scales;
+            let unit_per_s = self.scales.vorticity_per_s();
             let length = self.flow.size[0];
             let nx = x.len();
             let repeated = (0..REPEATS * nx + 1)
@@ -210,12 +212,15 @@ impl FinishedWake {
 
 /// `dw/dy - dv/dz` by differences over the neighbours, `[z][y]` \[1/s\].
 fn axial_vorticity_per_s(planes: &CrossPlanes, place: usize) -> Vec<f64> {
-    let (ny, nz) = (planes.y_m.len(), planes.z_m.len());
+    let ny = planes.y_m.len();
+    let nz = planes.z_m.len();
     let mut out = Vec::with_capacity(ny * nz);
     for k in 0..nz {
-        let (low, high) = (k.saturating_sub(1), (k + 1).min(nz - 1));
+        let low = k.saturating_sub(1);
+        let high = (k + 1).min(nz - 1);
         for j in 0..ny {
-            let (left, right) = (j.saturating_sub(1), (j + 1).min(ny - 1));
+            let left = j.saturating_sub(1);
+            let right = (j + 1).min(ny - 1);
             let dw = planes.w_m_s[[place, k, right]] - planes.w_m_s[[place, k, left]];
             let dv = planes.v_m_s[[place, high, j]] - planes.v_m_s[[place, low, j]];
             out.push(

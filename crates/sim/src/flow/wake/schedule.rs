@@ -70,7 +70,9 @@ impl Schedule {
             times_s: Vec::new(),
             due: Vec::new(),
         };
-        let (mut last, mut fields, mut planes) = (f64::NEG_INFINITY, 0..usize::MAX, 0..usize::MAX);
+        let mut last = f64::NEG_INFINITY;
+        let mut fields = 0..usize::MAX;
+        let mut planes = 0..usize::MAX;
         for (tau, kind) in all {
             if tau - last > SAME {
                 last = tau;

@@ -93,7 +93,8 @@ impl ArrayInFile {
 
     /// Samples that follow each other in the file, from one of them on.
     fn run(&mut self, first: u64, count: usize) -> std::io::Result<Vec<Complex<f64>>> {
-        let (stored, size) = (&self.stored, self.stored.sample_bytes());
+        let stored = &self.stored;
+        let size = self.stored.sample_bytes();
         let mut raw = vec![0; count * size as usize];
         self.file
             .seek(SeekFrom::Start(stored.begin + first * size))?;

@@ -424,7 +424,8 @@ impl Numbers<'_> {
             lengths.pop()
         };
         let samples = samples.ok_or("it holds a single number, no records")? as usize;
-        let (records, is_complex) = (lengths.iter().product::<u64>() as usize, stored.is_complex);
+        let records = lengths.iter().product::<u64>() as usize;
+        let is_complex = stored.is_complex;
         let are_integers = !stored.number.is_float();
         let zero = stored.number.zero();
         let array = ArrayInFile {

@@ -89,10 +89,8 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
         true => scale * middle_code(bits),
         false => 0.0,
     };
-    let (shape, is_complex) = (
-        [lengths.iter().product::<u64>() as usize, samples as usize],
-        are_pairs || second.is_some(),
-    );
+    let shape = [lengths.iter().product::<u64>() as usize, samples as usize];
+    let is_complex = are_pairs || second.is_some();
     let about = about(file, shape[0])?;
     let source = NetcdfRecords {
         file: file.clone(),
@@ -149,9 +147,11 @@ fn blocks(lengths: &[u64], places: Range<u64>) -> Vec<Vec<Range<u64>>> {
         return vec![Vec::new()];
     };
     let row = inner.iter().product::<u64>();
-    let (mut at, mut out) = (places.start, Vec::new());
+    let mut at = places.start;
+    let mut out = Vec::new();
     while at < places.end {
-        let (first, rows) = (at / row, (places.end - at) / row);
+        let first = at / row;
+        let rows = (places.end - at) / row;
         if at % row == 0 && rows > 0 {
             out.push(
                 std::iter::once(first..first + rows)

@@ -90,7 +90,8 @@ impl StoredArray {
             .collect();
         // A sign of the byte order, then the kind; bytes that are no text may be several to a sign.
         let mut signs = kind.chars();
-        let (order, name) = (signs.next(), signs.as_str());
+        let order = signs.next();
+        let name = signs.as_str();
         let (number, is_complex) = match name {
             "c8" => (Some(NumberType::F32), true),
             "c16" => (Some(NumberType::F64), true),
@@ -124,7 +125,8 @@ pub(super) fn archive(file: &mut File, length: u64) -> Result<Vec<(String, Store
     let [mut tail, mut table] = [(); 2].map(|()| vec![0; RECOMMENDED_BUFFER_SIZE]);
     let damaged = |_: rawzip::Error| NO_ARCHIVE;
     let archive = ZipArchive::from_file(own, &mut tail).map_err(damaged)?;
-    let (mut entries, mut found) = (archive.entries(&mut table), Vec::new());
+    let mut entries = archive.entries(&mut table);
+    let mut found = Vec::new();
     while let Some(entry) = entries.next_entry().map_err(damaged)? {
         let name = String::from_utf8_lossy(entry.file_path().as_bytes()).into_owned();
         let Some(name) = name.strip_suffix(".npy") else {

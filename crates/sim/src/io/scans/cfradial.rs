@@ -28,7 +28,8 @@ pub(super) fn scans(
     format: &ScanFormat,
     sweep: usize,
 ) -> Result<Found, String> {
-    let (range_m, velocity) = (ranges(file)?, Field::velocity(file, format)?);
+    let range_m = ranges(file)?;
+    let velocity = Field::velocity(file, format)?;
     let rays = Rays::read(file, format, &velocity, range_m.len())?;
     let pulse_width_s = pulse_width(file)?;
     let place_deg = place(file)?;
@@ -331,7 +332,8 @@ impl GateLayout {
 
     /// The values \[ray, gate\] of a variable, one ray after the other; NaN for gates that a ray does not have.
     fn spread(&self, name: &str, values: Vec<f64>) -> Result<Vec<f64>, String> {
-        let (rays, gates) = (self.rays.len(), self.gates);
+        let rays = self.rays.len();
+        let gates = self.gates;
         let count = values.len();
         if self.is_full && count != rays * gates {
             return Err(format!(
@@ -414,11 +416,14 @@ fn times(file: &NetcdfFile, count: usize) -> Result<Times, String> {
 
 /// The rays of each sweep.
 fn sweeps(file: &NetcdfFile, count: usize) -> Result<Vec<std::ops::Range<usize>>, String> {
-    let (start, end) = ("sweep_start_ray_index", "sweep_end_ray_index");
+    let start = "sweep_start_ray_index";
+    let end = "sweep_end_ray_index";
     if !(file.has(start) && file.has(end)) {
         return Ok(std::iter::once(0..count).collect());
     }
-    let (starts, ends, last) = (file.floats(start)?, file.floats(end)?, count.max(1) - 1);
+    let starts = file.floats(start)?;
+    let ends = file.floats(end)?;
+    let last = count.max(1) - 1;
     let range = |(sweep, (start, end)): (usize, (&f64, &f64))| match 0.0 <= *start
         && start <= end
         && *end < count as f64

@@ -14,7 +14,8 @@ type Variable = (Vec<u64>, Vec<(&'static str, &'static str)>, Vec<f64>);
 impl Made {
     /// A file that holds them. Dimensions are called by their lengths; many values are zeros, in a byte each.
     fn open(&self) -> NetcdfFile {
-        let (mut dims, mut variables) = (Vec::new(), Vec::new());
+        let mut dims = Vec::new();
+        let mut variables = Vec::new();
         for (name, (shape, attributes, values)) in &self.0 {
             let shape = if shape.len() == 1 {
                 vec![values.len() as u64]

@@ -57,7 +57,8 @@ pub(super) fn scan_map(
         .windows(2)
         .find(|pair| pair[1].is_nan() || pair[1] <= pair[0])
     {
-        let (one_m, next_m) = (pair[0], pair[1]);
+        let one_m = pair[0];
+        let next_m = pair[1];
         return Err(format!(
             "{what}: range must increase from gate to gate, and {one_m} m is followed by {next_m} m"
         ));

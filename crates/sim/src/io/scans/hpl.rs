@@ -58,8 +58,8 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
                 number + 1
             )
         })?;
-        let (mut velocity_m_s, mut intensity) =
-            (vec![f64::NAN; header.gates], vec![f64::NAN; header.gates]);
+        let mut velocity_m_s = vec![f64::NAN; header.gates];
+        let mut intensity = vec![f64::NAN; header.gates];
         let ray = rays.len() + 1;
         for gate in 0..header.gates {
             let (number, line) = rest.next().ok_or_else(|| {

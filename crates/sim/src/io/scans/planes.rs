@@ -193,7 +193,8 @@ fn split(
 ) -> Result<Split, String> {
     let mut skipped = Vec::new();
     skipped.extend(drop_impossible(&mut rays)?);
-    let (count, azimuths) = (rays.len(), azimuths_degrees(&rays));
+    let count = rays.len();
+    let azimuths = azimuths_degrees(&rays);
     let scans = find(&rays);
     if scans.is_empty() {
         if let Some((low, high)) = azimuths {
@@ -429,7 +430,9 @@ fn isolated(elevation_rad: &[f64]) -> Vec<bool> {
 fn between_turns(elevation_rad: &[f64]) -> Vec<Range<usize>> {
     let back = TURN * extent(elevation_rad.iter().copied());
     let mut out = Vec::new();
-    let (mut first, mut extreme, mut direction) = (0, 0, 0.0);
+    let mut first = 0;
+    let mut extreme = 0;
+    let mut direction = 0.0;
     for i in 1..elevation_rad.len() {
         let step = elevation_rad[i] - elevation_rad[extreme];
         if direction == 0.0 {
