@@ -5,7 +5,7 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use wakescope_sim::cli::{Answer, Refusal};
-use wakescope_sim::setup::progress::{Observer, Stage, stop};
+use wakescope_sim::progress::{Observer, Stage, stop};
 
 /// What is told.
 pub(crate) enum Event {

@@ -16,13 +16,13 @@ use wakescope_estimate::{
     polar_points,
     spectrum::unweighted_lags,
 };
+use wakescope_sim::plan::estimators;
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
 use wakescope_sim::run;
 use wakescope_sim::scene::{
     Flow, Outside, Retrieval, Scene, SceneFile, SimulatedFlow, SimulatedMotion, SnrReference,
 };
-use wakescope_sim::setup::estimators;
-use wakescope_sim::setup::progress::Silent;
 
 /// Radius of the regions \[m\].
 const RADIUS_M: f64 = 2.0;

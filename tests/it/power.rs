@@ -3,9 +3,9 @@
 use wakescope_optics::EfficiencyProfile;
 use wakescope_optics::theory::free_space_efficiency;
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
 use wakescope_sim::run;
 use wakescope_sim::scene::{Flow, NoiseModel, Scene, SceneFile};
-use wakescope_sim::setup::progress::Silent;
 
 fn plan(change: impl Fn(&mut Scene)) -> Plan {
     let mut scene = Scene {

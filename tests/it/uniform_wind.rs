@@ -2,9 +2,9 @@
 
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
 use wakescope_sim::run;
 use wakescope_sim::scene::{Flow, Refinement, Scene, SceneFile, SnrReference};
-use wakescope_sim::setup::progress::Silent;
 
 /// Errors of the map of a uniform wind.
 fn map(lateral_m_s: f64, change: impl Fn(&mut Scene)) -> VelocityEstimates {

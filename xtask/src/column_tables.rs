@@ -4,8 +4,8 @@ use fixtures::failure::Failure;
 use std::path::Path;
 use wakescope_sim::io::VelocityMap;
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::SceneFile;
-use wakescope_sim::setup::progress::Silent;
 use wakescope_sim::write::velocity_map;
 
 /// One line of sight with few gates.

@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use wakescope_sim::plan::{Plan, Stage, Target};
-//! use wakescope_sim::setup::progress::Silent;
+//! use wakescope_sim::progress::Silent;
 //! use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
 //!
 //! # fn main() -> Result<(), wakescope_sim::Error> {
@@ -27,8 +27,9 @@
 //! | module | what is in it |
 //! |---|---|
 //! | [`scene`] | the scene: keys, defaults, limits, errors with line numbers |
-//! | [`setup`] | what is made of a scene: instrument, estimators, wind, beams and their samples |
-//! | [`plan`] | stages, what is left out, forecast of time and memory |
+//! | [`plan`] | what a run will do: instrument, estimators, wind and geometry of a scene; stages with their time and memory |
+//! | [`beams`] | when, from where and in which direction each pulse leaves |
+//! | [`progress`], [`streams`] | progress of a run and how to stop it; one random stream for each pulse |
 //! | [`measure`] | signals, velocities and their errors |
 //! | [`detection`] | whether scans hold a wake, at a rate of false alarms that is calibrated for them |
 //! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
@@ -45,22 +46,26 @@
 //! of NetCDF-4), `plots` (SVG and PNG), `mpi` (flows on several machines).
 
 pub mod accuracy;
+pub mod beams;
 pub mod detection;
 pub mod flow;
+mod interpolation;
 pub mod io;
 mod keys;
 mod machine;
 pub mod measure;
+mod memo;
 mod outputs;
 pub mod plan;
 #[cfg(feature = "mpi")]
 pub mod processes;
+pub mod progress;
+mod quantities;
 pub mod retrieve;
 pub mod run;
 pub mod scene;
-pub mod setup;
+pub mod streams;
 pub mod sweep;
-
 pub mod write;
 
 #[cfg(feature = "cli")]
@@ -73,9 +78,9 @@ mod error;
 pub use error::Error;
 pub use outputs::write_contents;
 pub use plan::{Plan, Target};
+pub use progress::Silent;
 pub use run::{RunResult, run};
 pub use scene::{Scene, SceneFile};
-pub use setup::progress::Silent;
 pub use write::write;
 
 #[cfg(doctest)]

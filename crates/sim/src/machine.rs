@@ -2,7 +2,7 @@
 //!
 //! Check: control groups and limits of the shell below the machine's memory win; text that is no number counts as no limit.
 
-use crate::plan::units;
+use crate::quantities;
 
 /// Memory that can be had without swapping, bytes: what the system says is available, or less where a control group or a limit
 /// of the shell (`ulimit -v`) leaves less. `None` where the system does not say.
@@ -39,8 +39,8 @@ pub(crate) fn holds(what: &str, bytes: f64) -> Result<(), String> {
         .then(available_memory_bytes)
         .flatten()
         .filter(|available| bytes > *available);
-    let needed = units::bytes(bytes);
-    match too_much.map(units::bytes) {
+    let needed = quantities::bytes(bytes);
+    match too_much.map(quantities::bytes) {
         Some(available) => Err(format!(
             "{what} would take {needed} of memory, and {available} are available"
         )),

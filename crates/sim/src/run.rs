@@ -1,16 +1,16 @@
 //! Runs a plan: each stage once, nothing that the plan leaves out.
 
 use crate::Error;
+use crate::interpolation::{interpolate, linspace};
 use crate::io::CrossPlanes;
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::plane;
 use crate::measure::profile::{Efficiencies, LineOptics, RangeProfile};
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage, Target};
+use crate::progress::Observer;
 use crate::retrieve::realisations::{SceneRetrieval, of_realisations};
 use crate::scene::DetectorSignal;
-use crate::setup::progress::Observer;
-use crate::setup::table::{of_table, spaced};
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex;
 use wakescope_estimate::{SignalKind, window::Sample};
@@ -57,7 +57,7 @@ impl ScanMiddle {
         let range_m = middle_m(plan);
         let of_signals = scanner.map(|scanner| {
             let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
-            10.0 * of_table(&layer_m, &snr, range_m).log10()
+            10.0 * interpolate(&layer_m, &snr, range_m).log10()
         });
         let efficiency = there.and_then(|p| p.efficiency.mean.first().copied());
         let snr_db = of_signals.or_else(|| there?.snr_db.first().copied())?;
@@ -87,7 +87,7 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
         observer,
     };
     if matches!(plan.target, Target::Run | Target::Efficiency) {
-        let range_m = spaced(
+        let range_m = linspace(
             o.profile_range_min_m,
             o.profile_range_max_m,
             o.profile_points,

@@ -8,6 +8,7 @@ mod pictures;
 pub use map::velocity_map;
 
 use crate::Error;
+use crate::beams::Beam;
 use crate::io::signals::{RawSignals, Recording};
 use crate::io::{Existing, Table, VelocityMap, hpl, tables};
 use crate::measure::beam_winds;
@@ -17,7 +18,6 @@ use crate::outputs::Outputs;
 use crate::plan::{Plan, Stage, Target};
 use crate::run::RunResult;
 use crate::scene::{DetectorSignal, NoiseModel, Pattern};
-use crate::setup::beams::Beam;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 

@@ -2,7 +2,7 @@
 
 use super::context::*;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
-use wakescope_sim::setup::estimators;
+use wakescope_sim::plan::estimators;
 
 const RADII_M: [f64; 3] = [1.0, 2.0, 4.0];
 /// Where the chapter gives the levels.

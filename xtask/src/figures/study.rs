@@ -7,11 +7,11 @@ use std::path::PathBuf;
 use wakescope_sim::io::csv::Column;
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::map::VelocityEstimates;
+use wakescope_sim::plan::wind;
 use wakescope_sim::scene::{
     Flow, Method, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion, Turbulence,
     VortexMotion, VortexPair, Weighting,
 };
-use wakescope_sim::setup::wind;
 use wakescope_sim::sweep;
 
 /// What counts as inside a vortex, m from its centre.

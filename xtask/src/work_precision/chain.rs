@@ -11,9 +11,9 @@ use wakescope_sim::accuracy::keys::{REALISATIONS, WINDOW_STEP, with};
 use wakescope_sim::accuracy::metrics::Metric;
 use wakescope_sim::accuracy::{Report, Request, Setting};
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
 use wakescope_sim::run;
 use wakescope_sim::scene::SceneFile;
-use wakescope_sim::setup::progress::Silent;
 
 /// Realisations of the scan.
 const COUNTS: [f64; 6] = [2.0, 4.0, 8.0, 16.0, 32.0, 64.0];

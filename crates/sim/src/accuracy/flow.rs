@@ -11,7 +11,7 @@ use crate::Error;
 use crate::flow::CaseFile;
 use crate::flow::trial::{History, history_of};
 use crate::io::csv::float_text;
-use crate::setup::progress::{Observer, Stage};
+use crate::progress::{Observer, Stage};
 use std::time::Instant;
 use wakescope_estimate::Measured;
 

@@ -10,17 +10,17 @@ use super::keys::{
 use super::metrics::{Metric, Sample};
 use super::{Report, Request, Row, Setting};
 use crate::Error;
+use crate::interpolation::interpolate;
 use crate::io::csv::float_text;
+use crate::measure::efficiency_model::{
+    drawn_turbulence, model, signals_cross_screens, stretches, turbulence,
+};
 use crate::measure::map;
 use crate::measure::profile::LineOptics;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Target};
+use crate::progress::{Observer, Stage};
 use crate::scene::{Method, Pattern, Scene, SceneFile, ScreenSampling};
-use crate::setup::efficiency_model::{
-    drawn_turbulence, model, signals_cross_screens, stretches, turbulence,
-};
-use crate::setup::progress::{Observer, Stage};
-use crate::setup::table::of_table;
 use crate::sweep::Common;
 use std::time::Instant;
 use wakescope_estimate::Measured;
@@ -361,7 +361,7 @@ fn efficiency_in_the_middle(optics: &LineOptics<'_>) -> Result<Vec<f64>, Error> 
     let each: Vec<f64> = screens
         .realisations
         .iter()
-        .map(|over_mean| mean * of_table(&screens.range_m, over_mean, middle_m))
+        .map(|over_mean| mean * interpolate(&screens.range_m, over_mean, middle_m))
         .collect();
     let group_mean = |group: &[f64]| group.iter().sum::<f64>() / group.len() as f64;
     Ok(each.chunks(GROUP).map(group_mean).collect())
@@ -378,7 +378,7 @@ fn layer_shift(plan: &Plan) -> [f64; 2] {
     let range_m: Vec<f64> = gaps.iter().map(|gap| gap.range_m).collect();
     let relative: Vec<f64> = gaps.iter().map(|gap| gap.relative).collect();
     let largest = relative.iter().fold(0.0, |most, gap| gap.abs().max(most));
-    [of_table(&range_m, &relative, middle_m), largest]
+    [interpolate(&range_m, &relative, middle_m), largest]
 }
 
 /// Powers of two times `first` up to `last`, with the given value among them.
@@ -444,7 +444,7 @@ mod tests {
                 exact.push(across_screens / along_path - 1.0);
             }
             let [middle, largest] = layer_shift(&plan);
-            let expected = of_table(&range_m, &exact, middle_m(&plan));
+            let expected = interpolate(&range_m, &exact, middle_m(&plan));
             assert!(
                 (middle / expected - 1.0).abs() < 1e-3,
                 "{middle} {expected}"

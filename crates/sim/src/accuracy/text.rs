@@ -8,7 +8,7 @@ use crate::Error;
 use crate::io::Table;
 #[cfg(feature = "cli")]
 use crate::outputs::Outputs;
-use crate::plan::units::seconds;
+use crate::quantities::seconds;
 use wakescope_estimate::Measured;
 
 /// A fraction in percent.

@@ -12,8 +12,8 @@ use crate::measure::recorded::{
 };
 use crate::outputs::{List, Outputs};
 use crate::plan::Plan;
+use crate::progress::{Observer, Silent};
 use crate::scene::SceneFile;
-use crate::setup::progress::{Observer, Silent};
 use crate::{Error, retrieve, scene};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args};

@@ -7,7 +7,7 @@ use crate::measure::bound::{bound as of_plan, points};
 use crate::measure::budget::{Budget, scan_ranges_m};
 use crate::outputs::Outputs;
 use crate::plan::{Plan, Target};
-use crate::setup::progress::Silent;
+use crate::progress::Silent;
 use crate::{Error, scene};
 use serde_json::json;
 use std::collections::BTreeMap;

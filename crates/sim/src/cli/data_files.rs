@@ -3,7 +3,7 @@
 //! Check: a folder of a day with files that are cut short or hold other scans, in the tests of the program.
 
 use crate::Error;
-use crate::setup::progress::Observer;
+use crate::progress::Observer;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 

@@ -9,7 +9,7 @@ use crate::flow::FinishedWake;
 use crate::flow::{
     Begin, CaseFile, CaseKind, FlowOutcome, RunOptions, WakePreset, check_on, example, run_on,
 };
-use crate::setup::progress::{Observer, Silent};
+use crate::progress::{Observer, Silent};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Progress bars with the time left, on standard error; nothing where that is no terminal.
 
 use crate::plan::Stage;
-use crate::setup::progress::Observer;
+use crate::progress::Observer;
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use std::io::Write as _;
 use std::sync::Mutex;

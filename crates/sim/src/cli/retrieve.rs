@@ -13,11 +13,11 @@ use crate::io::Provenance;
 use crate::io::scans::{ReadScan, are_of_one_plane, face_alike, plane_numbers, share_origin};
 use crate::outputs::Outputs;
 use crate::plan::Stage;
+use crate::progress::{Observer, Silent};
 use crate::retrieve::{
     self, Method, PlaneTrack, RetrievedScan, SceneResponse, Velocities, gate_of,
 };
 use crate::scene::{Estimator, SceneFile};
-use crate::setup::progress::{Observer, Silent};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use clap::Args;
 use serde_json::json;

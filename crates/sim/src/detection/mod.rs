@@ -18,8 +18,8 @@ pub use scene_noise::SceneNoise;
 pub use tables::{scan_table, share_table};
 
 use crate::Error;
-use crate::setup::progress::{Observer, Stage};
-use crate::setup::streams::stream;
+use crate::progress::{Observer, Stage};
+use crate::streams::stream;
 use ndarray::s;
 use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
@@ -386,7 +386,7 @@ pub fn background(settings: &DetectionSettings, has_sigma: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::setup::progress::Silent;
+    use crate::progress::Silent;
     use ndarray::Array2;
     use rand_xoshiro::rand_core::Rng;
     use wakescope_estimate::vortex_fit::Wake;

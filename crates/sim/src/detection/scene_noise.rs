@@ -9,7 +9,7 @@
 use crate::Error;
 use crate::measure::map::velocities;
 use crate::plan::{Plan, Target};
-use crate::setup::progress::Observer;
+use crate::progress::Observer;
 use ndarray::{Array2, s};
 use wakescope_estimate::retrieval::ScanMap;
 
@@ -130,8 +130,9 @@ impl SceneNoise {
     /// Deviations, by range and line, of a map that is the mean of so many `scans`, where it states none or smaller ones: those that
     /// a few scans show of themselves are often far too small. They are those of velocities in sums, with [`excess`](Self::excess).
     pub fn give(&self, map: &mut ScanMap, scans: f64) {
-        let at =
-            |range_m: f64| crate::setup::table::of_table(&self.range_m, &self.sigma_m_s, range_m);
+        let at = |range_m: f64| {
+            crate::interpolation::interpolate(&self.range_m, &self.sigma_m_s, range_m)
+        };
         let least_m_s: Vec<f64> = map
             .range_m
             .iter()

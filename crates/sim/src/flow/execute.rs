@@ -11,7 +11,7 @@ use super::{Begin, CaseFile, FlowCase, FlowOutcome, age_tau};
 use crate::io::Existing;
 use crate::io::lock::FolderLock;
 use crate::keys::Problem;
-use crate::setup::progress::{Observer, Stage};
+use crate::progress::{Observer, Stage};
 use crate::{Error, machine};
 use std::path::Path;
 use std::sync::Arc;

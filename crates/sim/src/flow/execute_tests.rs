@@ -4,7 +4,7 @@ use super::*;
 use crate::flow::WakePreset;
 use crate::flow::files::CASE;
 use crate::flow::plane_vortices_for_tests;
-use crate::setup::progress::Silent;
+use crate::progress::Silent;
 use std::fs;
 use tempfile::TempDir;
 

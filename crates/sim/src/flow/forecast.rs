@@ -11,7 +11,7 @@ use super::files::{FileForecast, Files};
 use super::setup::Setup;
 use super::{CaseFile, CaseKind, InitialName, WakeOutput};
 use crate::keys::Declared as _;
-use crate::plan::units::{bytes, rounded, seconds};
+use crate::quantities::{bytes, rounded, seconds};
 use crate::{Error, machine};
 use serde::Serialize as _;
 use std::fmt;

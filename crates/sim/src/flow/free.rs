@@ -271,7 +271,7 @@ impl InitialPair {
             lateral_position_m: self.lateral_position_m,
             height_m: self.height_m,
             ground: Ground::Image,
-            profile: crate::setup::wind::circulation_profile(self.profile),
+            profile: crate::plan::wind::circulation_profile(self.profile),
             motion: Motion::Frozen,
         };
         let wind = pair.wind().map_err(Error::Flow)?;

@@ -150,7 +150,7 @@ impl CaseFile {
 
 /// Age of a wake of a time, without the last digits, in which the age that was asked for may not come back.
 fn age_tau(time_s: f64, tau_per_s: f64) -> f64 {
-    crate::plan::units::rounded(time_s * tau_per_s, 13)
+    crate::quantities::rounded(time_s * tau_per_s, 13)
 }
 
 /// Whether a run begins or continues.

@@ -3,7 +3,7 @@
 use super::execute::{RunOptions, run_on};
 use super::thread_ranks::on_threads;
 use super::{Begin, CaseFile};
-use crate::setup::progress::{Observer, Silent};
+use crate::progress::{Observer, Silent};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! Case files, interrupted runs, wrong input.
 
 use super::*;
-use crate::setup::progress::{Observer, Silent};
+use crate::progress::{Observer, Silent};
 use std::collections::BTreeMap;
 use std::fs;
 use wakescope_les::SubgridModel;

@@ -5,7 +5,7 @@
 use super::execute::prepare;
 use super::{CaseFile, CaseKind, RunOptions};
 use crate::Error;
-use crate::setup::progress::Observer;
+use crate::progress::Observer;
 use std::path::Path;
 use std::sync::Arc;
 use wakescope_les::analysis::WakeMeter;

@@ -57,7 +57,7 @@ impl VortexPairFlow {
             ground_stretch: self.ground_stretch,
             height: self.height,
             core_radius: self.core_radius,
-            profile: crate::setup::wind::circulation_profile(self.profile),
+            profile: crate::plan::wind::circulation_profile(self.profile),
             reynolds: self.reynolds,
             sticky_ground: self.sticky_ground,
             slip_sides: self.slip_sides,

@@ -11,7 +11,7 @@ use super::wake::{HISTORIES, WakeRun};
 use crate::Error;
 use crate::io::csv::float_text;
 use crate::io::{Provenance, write_atomic};
-use crate::setup::progress::Observer;
+use crate::progress::Observer;
 use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -8,7 +8,7 @@ use super::map::{Field, Unit, VelocityMap};
 use super::netcdf::{Data, FILL, Layout, Variable, described};
 use super::provenance::Provenance;
 use super::utc::MAX_TIME_S;
-use crate::setup::beams::SweepMode;
+use crate::beams::SweepMode;
 use std::f64::consts::FRAC_PI_2;
 
 /// Length of all text variables; unused bytes are NUL, since blanks stay in the strings of xarray and Py-ART.

@@ -8,7 +8,7 @@ use super::error::{OutputError, OutputResult};
 use super::map::VelocityMap;
 use super::utc::DAY_S;
 use crate::SPEED_OF_LIGHT_M_S;
-use crate::setup::beams::SweepMode;
+use crate::beams::SweepMode;
 use ndarray::Array2;
 
 /// No instrument has the number 0: with the file's own name it is all by which this program's files can be told, for readers

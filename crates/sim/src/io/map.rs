@@ -4,8 +4,8 @@
 
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use super::utc::UtcTime;
+use crate::beams::{Direction, SweepMode};
 use crate::scene::Site;
-use crate::setup::beams::{Direction, SweepMode};
 use ndarray::{Array2, Array3, Axis};
 use std::f64::consts::FRAC_PI_2;
 use wakescope_les::winds::{Edges, Side};

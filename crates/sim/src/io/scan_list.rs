@@ -8,7 +8,7 @@
 use super::csv_input::TextTable;
 use super::text_file;
 use crate::Error;
-use crate::setup::beams::{Stop, SweepMode};
+use crate::beams::{Stop, SweepMode};
 use std::path::Path;
 
 /// Most rows that are read.

@@ -103,7 +103,7 @@ impl Source for TextTable {
 }
 
 /// The names of one variable.
-pub(crate) struct Known {
+pub(crate) struct Memo {
     /// Words between blanks, the preferred one first; small and capital letters are alike.
     names: &'static str,
     standard_names: &'static [&'static str],
@@ -113,12 +113,12 @@ pub(crate) const AWAY: &str = "radial_velocity_of_scatterers_away_from_instrumen
 pub(crate) const TOWARDS: &str = "radial_velocity_of_scatterers_toward_instrument";
 
 /// Radial velocities, positive away unless the standard name says otherwise.
-pub(crate) const VELOCITY: Known = Known {
+pub(crate) const VELOCITY: Memo = Memo {
     names: "radial_velocity velocity v_mean radial_wind_speed vel vr vrad vradh doppler_velocity mean_doppler_velocity dv v_raw",
     standard_names: &[AWAY, TOWARDS],
 };
 /// Standard deviations of radial velocities.
-pub(crate) const SIGMA: Known = Known {
+pub(crate) const SIGMA: Memo = Memo {
     names: "velocity_standard_deviation sigma std predicted_std radial_velocity_error velocity_error errdv radial_velocity_std",
     standard_names: &[
         "radial_velocity_of_scatterers_away_from_instrument standard_error",
@@ -126,15 +126,15 @@ pub(crate) const SIGMA: Known = Known {
     ],
 };
 /// Ratios of signal and noise.
-pub(crate) const RATIO: Known = Known {
+pub(crate) const RATIO: Memo = Memo {
     names: "signal_to_noise_ratio snr cnr carrier_to_noise_ratio intensity signal_to_noise_ratio_plus_one snr_plus_one",
     standard_names: &["signal_to_noise_ratio"],
 };
-pub(crate) const RANGE: Known = Known {
+pub(crate) const RANGE: Memo = Memo {
     names: "range distance slant_range",
     standard_names: &["projection_range_coordinate"],
 };
-pub(crate) const ELEVATION: Known = Known {
+pub(crate) const ELEVATION: Memo = Memo {
     names: "elevation elevation_angle ele elev",
     standard_names: &[
         "ray_elevation_angle",
@@ -143,11 +143,11 @@ pub(crate) const ELEVATION: Known = Known {
     ],
 };
 /// Angles from the zenith, where a file has no elevations.
-pub(crate) const ZENITH: Known = Known {
+pub(crate) const ZENITH: Memo = Memo {
     names: "zenith zenith_angle",
     standard_names: &["zenith_angle", "sensor_zenith_angle"],
 };
-pub(crate) const AZIMUTH: Known = Known {
+pub(crate) const AZIMUTH: Memo = Memo {
     names: "azimuth azimuth_angle azi",
     standard_names: &[
         "ray_azimuth_angle",
@@ -155,27 +155,27 @@ pub(crate) const AZIMUTH: Known = Known {
         "beam_azimuth_angle",
     ],
 };
-pub(crate) const TIME: Known = Known {
+pub(crate) const TIME: Memo = Memo {
     names: "time timestamp",
     standard_names: &["time"],
 };
 /// Nyquist velocities: half the interval after which velocities repeat.
-pub(crate) const NYQUIST: Known = Known {
+pub(crate) const NYQUIST: Memo = Memo {
     names: "nyquist_velocity nyquist nyquist_vel nqv unambiguous_velocity",
     standard_names: &[],
 };
 /// 1 for rays while the head moves to the place of another scan.
-pub(crate) const TRANSITION: Known = Known {
+pub(crate) const TRANSITION: Memo = Memo {
     names: "antenna_transition",
     standard_names: &[],
 };
-pub(crate) const PULSE_WIDTH: Known = Known {
+pub(crate) const PULSE_WIDTH: Memo = Memo {
     names: "pulse_width pulse_duration",
     standard_names: &[],
 };
 
 /// The variable of a file that is known by one of these names.
-pub(crate) fn find<'s>(source: &'s impl Source, known: &Known) -> Option<&'s str> {
+pub(crate) fn find<'s>(source: &'s impl Source, known: &Memo) -> Option<&'s str> {
     let names = source.names();
     let exact = |wanted: &str| names.iter().find(|name| **name == wanted);
     let of_letters = |wanted: &str| names.iter().find(|name| name.eq_ignore_ascii_case(wanted));

@@ -498,10 +498,7 @@ impl Walk<'_> {
             .map(|(tag, ..)| *tag)
             .chain(keys.iter().map(|key| key.name))
             .collect();
-        format!(
-            "there is no such key{hint} Known here: {}",
-            known.join(", ")
-        )
+        format!("there is no such key{hint} Memo here: {}", known.join(", "))
     }
 
     /// What a key takes in place of what is written, with an example.

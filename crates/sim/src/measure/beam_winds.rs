@@ -3,11 +3,11 @@
 //! Check: a scan of a uniform wind gives it back; the table has the errors of closed forms.
 
 use crate::Error;
+use crate::beams::Beam;
 use crate::io::Table;
 use crate::measure::map::VelocityEstimates;
 use crate::plan::Plan;
 use crate::scene::Pattern;
-use crate::setup::beams::Beam;
 use ndarray::Array2;
 use wakescope_estimate::wind_profile::{fit_wind, swing};
 

@@ -4,14 +4,14 @@
 //! cover, each of the samples of all its windows. Check: the stored curve of independent origin for one window of Table 2; no
 //! estimate of a region scatters less.
 
+use crate::interpolation::interpolate;
 use crate::io::Table;
+use crate::measure::ray_information::RayInformation;
+use crate::measure::region::{places, region_radius};
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
-use crate::setup::estimators;
-use crate::setup::progress::Observer;
-use crate::setup::ray_information::RayInformation;
-use crate::setup::region::{places, region_radius};
-use crate::setup::table::of_table;
+use crate::plan::estimators;
+use crate::progress::Observer;
 use crate::{Error, scene::NoiseModel};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -98,7 +98,7 @@ impl<'p> Setting<'p> {
             of_region += pulses as f64 * by_gates[chord.gates().min(most) - 1];
         }
         let ratios = [
-            of_table(&rays.layer_m, &rays.layer_snr, range_m),
+            interpolate(&rays.layer_m, &rays.layer_snr, range_m),
             rays.of_windows(&[range_m])?[0],
         ];
         self.told(range_m, ratios, [rays.at(range_m, 1)?[0], of_region])
@@ -234,8 +234,8 @@ mod tests {
     use super::*;
     use crate::SPEED_OF_LIGHT_M_S;
     use crate::plan::Target;
+    use crate::progress::Silent;
     use crate::scene::{DetectorSignal, NoiseModel, Scene, SceneFile, SnrReference};
-    use crate::setup::progress::Silent;
 
     fn of(change: impl FnOnce(&mut Scene)) -> Result<SceneBound, Error> {
         let mut scene = Scene::default();

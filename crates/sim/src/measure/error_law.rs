@@ -5,8 +5,8 @@
 //! Check: errors of many realisations, given out a few at a time.
 
 use crate::Error;
+use crate::measure::ray_information::range_filter;
 use crate::plan::Plan;
-use crate::setup::ray_information::range_filter;
 use ndarray::Array2;
 use std::collections::BTreeMap;
 

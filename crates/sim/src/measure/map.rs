@@ -1,17 +1,17 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
 use crate::Error;
+use crate::measure::air::{radial_velocity_m_s, seen_m_s};
 use crate::measure::error_law::{ErrorLaw, ScanErrors, shared_cells};
 use crate::measure::gate_estimates::GateSums;
 use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints};
+use crate::measure::ray_information::range_filter;
+use crate::measure::region::places;
 use crate::measure::scan::Scanner;
+use crate::plan::estimators;
 use crate::plan::{Plan, Stage};
+use crate::progress::Observer;
 use crate::scene::DetectorSignal;
-use crate::setup::air::{radial_velocity_m_s, seen_m_s};
-use crate::setup::estimators;
-use crate::setup::progress::Observer;
-use crate::setup::ray_information::range_filter;
-use crate::setup::region::places;
 use ndarray::{Array1, Array2, ArrayView2};
 use num_complex::Complex;
 use wakescope_estimate::{

@@ -5,11 +5,11 @@
 
 use crate::Error;
 use crate::measure::gate_estimates::GateEstimate;
+use crate::measure::ray_information::RayInformation;
+use crate::measure::region::region_radius;
 use crate::measure::scan::median_snr;
 use crate::plan::Plan;
-use crate::setup::estimators::{self, Toolkit};
-use crate::setup::ray_information::RayInformation;
-use crate::setup::region::region_radius;
+use crate::plan::estimators::{self, Toolkit};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;

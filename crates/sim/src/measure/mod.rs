@@ -10,20 +10,28 @@
 //! | [`recorded`] | the same from the records of a file, measured or simulated |
 //! | [`mod@bound`] | the Cramer-Rao bound for a scene |
 //! | [`budget`] | the power budget, from the pulse to the signal-to-noise ratio |
+//! | `air` | wind along beams |
+//! | `efficiency_model` | the cheapest model of the efficiency that is valid, and the ranges at which it is computed |
+//! | `region`, `ray_information` | radius of regions; information of a pulse on the velocity about a range |
 //! | `response`, `plane` | what the estimators show of a wake; the wind on a cross-plane |
 
+pub(crate) mod air;
 pub mod beam_winds;
 pub mod bound;
 pub mod budget;
 pub mod cell_average;
+pub(crate) mod efficiency_model;
 pub mod error_law;
 pub(crate) mod gate_estimates;
 pub mod map;
 pub(crate) mod map_estimator;
 pub(crate) mod plane;
 pub mod profile;
+pub(crate) mod ray_information;
 pub mod recorded;
+pub(crate) mod region;
 pub(crate) mod response;
 pub mod scan;
+pub(crate) mod sizes;
 #[cfg(test)]
 mod standard_error_tests;

@@ -1,10 +1,10 @@
 //! The wind on a cross-plane around the scan, for the files.
 
 use crate::Error;
+use crate::interpolation::linspace;
 use crate::io::{CrossPlanes, OPEN_EDGES};
+use crate::measure::sizes::PLANE_POINTS;
 use crate::plan::Plan;
-use crate::setup::sizes::PLANE_POINTS;
-use crate::setup::table::spaced;
 use ndarray::Array3;
 
 /// The wind at the start of the scan, over the ground that the scan covers.
@@ -18,8 +18,8 @@ pub(crate) fn cross_plane(plan: &Plan) -> Result<CrossPlanes, Error> {
     let far_m = scene.scan.range_max_m;
     let (low_y_m, high_y_m) = (scene.scan.range_min_m * bottom_rad.cos(), far_m);
     let top_m = (scene.scan.lidar_height_m + far_m * top_rad.sin()).max(0.1 * far_m);
-    let y_m = spaced(low_y_m, high_y_m, PLANE_POINTS.0);
-    let z_m = spaced(0.0, top_m, PLANE_POINTS.1);
+    let y_m = linspace(low_y_m, high_y_m, PLANE_POINTS.0);
+    let z_m = linspace(0.0, top_m, PLANE_POINTS.1);
     let points_m: Vec<[f64; 3]> = z_m
         .iter()
         .flat_map(|&z| y_m.iter().map(move |&y| [0.0, y, z]))

@@ -4,16 +4,16 @@
 //! focus (`every_output_has_the_same_ratio_through_a_focus`).
 
 use crate::Error;
-use crate::plan::{Plan, Stage};
-use crate::scene::{ReceiverPath, Scene, SnrReference, hash_of};
-use crate::setup::Setup;
-use crate::setup::efficiency_model::{
+use crate::interpolation::interpolate;
+use crate::measure::efficiency_model::{
     MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence,
 };
-use crate::setup::instrument::Instrument;
-use crate::setup::known::Known;
-use crate::setup::progress::Observer;
-use crate::setup::table::of_table;
+use crate::memo::Memo;
+use crate::plan::Setup;
+use crate::plan::instrument::Instrument;
+use crate::plan::{Plan, Stage};
+use crate::progress::Observer;
+use crate::scene::{ReceiverPath, Scene, SnrReference, hash_of};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wakescope_optics::air::StructureTable;
@@ -39,8 +39,8 @@ pub struct RangeProfile {
 /// The curves of some scenes.
 #[derive(Debug, Default)]
 pub(crate) struct Efficiencies {
-    layers: Known<EfficiencyProfile>,
-    screens: Known<Screens>,
+    layers: Memo<EfficiencyProfile>,
+    screens: Memo<Screens>,
 }
 
 impl Efficiencies {
@@ -149,7 +149,7 @@ impl LineOptics<'_> {
             }
             for &range_m in inside {
                 for (column, ratio) in found.iter_mut().zip(screens.over_theory.as_flattened()) {
-                    column.push(theory.mean[done] * of_table(&screens.range_m, ratio, range_m));
+                    column.push(theory.mean[done] * interpolate(&screens.range_m, ratio, range_m));
                 }
                 done += 1;
             }
@@ -352,9 +352,9 @@ mod tests {
     use crate::measure::bound::bound;
     use crate::measure::budget::Budget;
     use crate::plan::Target;
+    use crate::progress::Silent;
     use crate::run::run;
     use crate::scene::SceneFile;
-    use crate::setup::progress::Silent;
     use std::path::Path;
 
     fn plan(telescope: &str, [from_m, to_m]: [f64; 2], more: &str, target: Target) -> Plan {
@@ -506,7 +506,8 @@ mod tests {
         };
         let at_nodes: Vec<f64> = nodes_m.iter().map(ratio).collect();
         for range_m in &between_m {
-            let off_db = 10.0 * (of_table(&nodes_m, &at_nodes, *range_m) / ratio(range_m)).log10();
+            let off_db =
+                10.0 * (interpolate(&nodes_m, &at_nodes, *range_m) / ratio(range_m)).log10();
             assert!(off_db.abs() < 0.04, "{range_m}: {off_db}");
         }
     }

@@ -3,13 +3,13 @@
 //! Check: circulations fitted to maps and signals of a pair, in the tests of sweeps and retrievals.
 
 use crate::Error;
+use crate::measure::ray_information::RayInformation;
+use crate::measure::region::{places, region_radius};
 use crate::measure::scan::{Scanner, median_snr};
+use crate::plan::estimators::{Response, noise_kind, response, sampling, signal_kind};
 use crate::plan::{Plan, Target};
+use crate::progress::Observer;
 use crate::scene::{Scene, SceneFile};
-use crate::setup::estimators::{Response, noise_kind, response, sampling, signal_kind};
-use crate::setup::progress::Observer;
-use crate::setup::ray_information::RayInformation;
-use crate::setup::region::{places, region_radius};
 use wakescope_estimate::Radius;
 use wakescope_estimate::bound::Noise;
 use wakescope_estimate::vortex_fit::{EstimatorResponse, PulseShape, ScanSetup, WakeModel};

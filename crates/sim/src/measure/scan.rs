@@ -1,17 +1,17 @@
 //! One scan: the air along each line of sight, and the signals that it returns.
 
 use crate::Error;
+use crate::beams::Beam;
+use crate::measure::air::{Air, air_along, air_of_line, known_velocity_m_s};
+use crate::measure::efficiency_model::{drawn_turbulence, stretches};
 use crate::measure::profile::{Efficiencies, LineOptics, efficiency_by_theory};
+use crate::measure::sizes::{AIRS_BYTES, records_at_once};
+use crate::plan::geometry::Geometry;
+use crate::plan::instrument::Instrument;
 use crate::plan::{Plan, Stage};
+use crate::progress::Observer;
 use crate::scene::{DetectorSignal, Scene, SecondTrip, SnrReference};
-use crate::setup::air::{Air, air_along, air_of_line, known_velocity_m_s};
-use crate::setup::beams::Beam;
-use crate::setup::efficiency_model::{drawn_turbulence, stretches};
-use crate::setup::geometry::Geometry;
-use crate::setup::instrument::Instrument;
-use crate::setup::progress::Observer;
-use crate::setup::sizes::{AIRS_BYTES, records_at_once};
-use crate::setup::streams::stream;
+use crate::streams::stream;
 use ndarray::{Array2, ArrayView2};
 use rand_xoshiro::rand_core::Rng;
 use rayon::prelude::*;

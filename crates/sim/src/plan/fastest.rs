@@ -3,9 +3,9 @@
 //! Check: the peaks of flows with known ones.
 
 use crate::Error;
-use crate::setup::Setup;
-use crate::setup::air::known_velocity_m_s;
-use crate::setup::table::spaced;
+use crate::interpolation::linspace;
+use crate::measure::air::known_velocity_m_s;
+use crate::plan::Setup;
 
 /// Lines and places along them at which the fastest air is looked for first.
 const MOST_LINES: usize = 1000;
@@ -40,7 +40,7 @@ pub(super) fn fastest_m_s(setup: &Setup) -> Result<f64, Error> {
     };
     let lines = schedule.lines.len().min(MOST_LINES);
     let line = |i: usize| i * schedule.lines.len() / lines;
-    let range_m = spaced(
+    let range_m = linspace(
         scan.range_min_m,
         scan.range_max_m,
         (MOST_PLACES / lines).clamp(16, 1000),
@@ -52,7 +52,7 @@ pub(super) fn fastest_m_s(setup: &Setup) -> Result<f64, Error> {
     let step_m = range_m[1] - range_m[0];
     let mut fastest_m_s = found.first().map_or(0.0, |fastest| fastest.0);
     for (_, at_m, line) in found.into_iter().take(8) {
-        let near_m = spaced(
+        let near_m = linspace(
             (at_m - step_m).max(scan.range_min_m),
             (at_m + step_m).min(scan.range_max_m),
             65,

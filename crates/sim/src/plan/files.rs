@@ -5,9 +5,9 @@
 
 use super::sizes::{MAP_FIELDS, Sizes, is_calm};
 use super::stage::{PlannedStage, Target, run};
+use crate::plan::geometry::Geometry;
+use crate::progress::Stage;
 use crate::scene::Scene;
-use crate::setup::geometry::Geometry;
-use crate::setup::progress::Stage;
 
 /// Columns of the table of a map.
 const MAP_COLUMNS: f64 = 25.0;
@@ -74,7 +74,7 @@ pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> P
         written.picture(pictures, PROFILE_PIXELS, 0.0);
     }
     if target == Target::Run && o.flow && !is_calm(scene) {
-        let (ny, nz) = crate::setup::sizes::PLANE_POINTS;
+        let (ny, nz) = crate::measure::sizes::PLANE_POINTS;
         let points = (ny * nz) as f64;
         written.table(o.csv, points, 6.0);
         written.netcdf(netcdf, points * 8.0);

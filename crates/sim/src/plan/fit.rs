@@ -5,10 +5,10 @@
 use super::sizes::Sizes;
 use super::stage::{PlannedStage, largest_memory};
 use super::stages::of_bound;
-use super::units::bytes;
 use super::{Plan, Target};
+use crate::progress::Stage;
+use crate::quantities::bytes;
 use crate::scene::{Pattern, ScreenSampling, Turbulence};
-use crate::setup::progress::Stage;
 use crate::{Error, machine};
 
 /// Part of the memory that is available which a run may take.

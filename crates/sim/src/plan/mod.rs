@@ -4,30 +4,37 @@
 //! forecasts are products of counts with unit costs.
 
 use crate::Error;
+use crate::memo::Memo;
+use crate::plan::wind::SceneWind;
+use crate::quantities;
 use crate::scene::SceneFile;
-use crate::setup::Setup;
-use crate::setup::known::Known;
-use crate::setup::wind::SceneWind;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
 use wakescope_optics::plan::Plan as ScreenPlan;
 
+pub(crate) mod described;
+pub mod estimators;
 mod fastest;
 mod files;
 mod fit;
+pub mod geometry;
+pub mod instrument;
 mod optics;
 mod possible;
+pub(crate) mod scan_lines;
 mod schedule;
+mod setup;
 mod sizes;
 mod stage;
 mod stages;
 pub(crate) mod time;
-pub(crate) mod units;
 mod warnings;
+pub mod wind;
 
-pub use crate::setup::progress::Stage;
+pub use crate::progress::Stage;
 pub use schedule::ScanSchedule;
+pub use setup::Setup;
 pub use stage::{PlannedStage, Target};
 
 /// What a run will do.
@@ -57,7 +64,7 @@ impl Plan {
     /// such as phase screens too coarse for the turbulence; results that a file cannot hold.
     pub fn new(scene: SceneFile, target: Target) -> Result<Self, Error> {
         let wind = Arc::new(SceneWind::new(&scene)?);
-        Self::sharing(scene, target, wind, &Known::default())
+        Self::sharing(scene, target, wind, &Memo::default())
     }
 
     /// Plans a run with the wind of the scene, and phase screens that were planned before, which others may share.
@@ -68,7 +75,7 @@ impl Plan {
         scene: SceneFile,
         target: Target,
         wind: Arc<SceneWind>,
-        planned: &Known<Vec<ScreenPlan>>,
+        planned: &Memo<Vec<ScreenPlan>>,
     ) -> Result<Self, Error> {
         let file = scene.clone();
         let made = || {
@@ -141,7 +148,7 @@ impl fmt::Display for Plan {
         )?;
         for s in &self.stages {
             let (word, memory) = if s.runs {
-                ("run", units::bytes(s.memory_bytes))
+                ("run", quantities::bytes(s.memory_bytes))
             } else {
                 ("skip", String::new())
             };
@@ -153,8 +160,8 @@ impl fmt::Display for Plan {
             )?;
         }
         let (time, memory) = (
-            units::seconds(self.core_s),
-            units::bytes(self.memory_bytes()),
+            quantities::seconds(self.core_s),
+            quantities::bytes(self.memory_bytes()),
         );
         writeln!(
             f,

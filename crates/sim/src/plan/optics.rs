@@ -2,15 +2,15 @@
 
 use super::stage::{PlannedStage, Target, run, skip};
 use crate::Error;
-use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
-use crate::setup::Setup;
-use crate::setup::efficiency_model::{
+use crate::interpolation::linspace;
+use crate::measure::efficiency_model::{
     MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, stretches,
     turbulence,
 };
-use crate::setup::known::Known;
-use crate::setup::progress::Stage;
-use crate::setup::table::spaced;
+use crate::memo::Memo;
+use crate::plan::Setup;
+use crate::progress::Stage;
+use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
 use std::sync::Arc;
 use wakescope_optics::plan::Plan as ScreenPlan;
 use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
@@ -27,7 +27,7 @@ pub(crate) type ScreenPlans = Arc<Vec<ScreenPlan>>;
 pub(super) fn stages(
     setup: &Setup,
     target: Target,
-    planned: &Known<Vec<ScreenPlan>>,
+    planned: &Memo<Vec<ScreenPlan>>,
     warnings: &mut Vec<String>,
 ) -> Result<([PlannedStage; 2], f64, ScreenPlans), Error> {
     let Setup {
@@ -46,7 +46,7 @@ pub(super) fn stages(
     let model = model(scene);
     // Ranges at which the efficiency is wanted: for the table, and for the layers of the signals.
     let table = matches!(target, Target::Run | Target::Efficiency).then(|| {
-        spaced(
+        linspace(
             o.profile_range_min_m,
             o.profile_range_max_m,
             o.profile_points,
@@ -165,7 +165,7 @@ fn screens(
     setup: &Setup,
     t: &RefractiveTurbulence,
     runs: &[Vec<f64>],
-    planned: &Known<Vec<ScreenPlan>>,
+    planned: &Memo<Vec<ScreenPlan>>,
     warnings: &mut Vec<String>,
 ) -> Result<(PlannedStage, f64, ScreenPlans), Error> {
     let (mut core_s, mut working_bytes) = (0.0, 0.0_f64);

@@ -7,8 +7,8 @@ use super::{Plan, Stage, Target};
 use crate::Error;
 use crate::io::UtcTime;
 use crate::io::hpl::within_a_day;
+use crate::measure::air::radial_velocity_m_s;
 use crate::scene::{DetectorSignal, Flow, Outside};
-use crate::setup::air::radial_velocity_m_s;
 use wakescope_estimate::wake_detection::WakeDetector;
 
 /// Refuses what a run of the plan would refuse: lines that leave a simulated flow, a test for a wake in a scan of a few velocities.

@@ -49,9 +49,9 @@ impl Plan {
             }
         });
         let wake_moves_m = pair.map_or(f64::NAN, |pair| {
-            meanwhile_s * crate::setup::wind::vortex_pair(pair).descent_speed_m_s()
+            meanwhile_s * crate::plan::wind::vortex_pair(pair).descent_speed_m_s()
         });
-        let turned = |line: &crate::setup::beams::Line| {
+        let turned = |line: &crate::beams::Line| {
             let fastest = line.rate_rad_s[0].abs().max(line.rate_rad_s[1].abs());
             fastest * line.pulses as f64 * scan.prt_s
         };

@@ -3,9 +3,9 @@
 //! All are floating-point numbers: products of what a scene may say go far beyond what an integer holds.
 
 use super::stage::Target;
+use crate::measure::efficiency_model::drawn_turbulence;
+use crate::plan::geometry::Geometry;
 use crate::scene::{DetectorSignal, Flow, Scene, SignalsOf};
-use crate::setup::efficiency_model::drawn_turbulence;
-use crate::setup::geometry::Geometry;
 
 /// Fields of a map of estimates.
 pub(super) const MAP_FIELDS: f64 = 16.0;

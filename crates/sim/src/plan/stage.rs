@@ -3,7 +3,7 @@
 //! Stages run one after another and free what they worked with, so memory is the largest over the stages of what the earlier
 //! ones keep and the stage itself holds. Check: sums by hand.
 
-use crate::setup::progress::Stage;
+use crate::progress::Stage;
 
 /// What the user asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,11 +3,11 @@
 use super::files::files;
 use super::sizes::{MAP_FIELDS, Sizes, is_calm};
 use super::stage::{PlannedStage, Target, run, skip};
+use crate::measure::sizes::{AIRS_BYTES, records_at_once};
+use crate::plan::Setup;
+use crate::plan::geometry::Geometry;
+use crate::progress::Stage;
 use crate::scene::{Method, NoiseModel, RegionRadius, RetrievalMethod, Scene, WindOfPulses};
-use crate::setup::Setup;
-use crate::setup::geometry::Geometry;
-use crate::setup::progress::Stage;
-use crate::setup::sizes::{AIRS_BYTES, records_at_once};
 
 /// Numbers of a cell that fits hold.
 const RETRIEVED_NUMBERS: f64 = 60.0;
@@ -79,7 +79,7 @@ fn cross_plane(scene: &Scene, target: Target) -> PlannedStage {
     if is_calm(scene) {
         return skip(Stage::CrossPlane, "flow.kind is \"calm\"");
     }
-    let (ny, nz) = crate::setup::sizes::PLANE_POINTS;
+    let (ny, nz) = crate::measure::sizes::PLANE_POINTS;
     let points = (ny * nz) as f64;
     // Places and velocities are at work; two components are kept.
     run(

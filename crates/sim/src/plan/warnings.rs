@@ -3,10 +3,10 @@
 //! Check: each warning appears with what it warns of, and not without; remedies that it names leave none; the number of empty gates is that
 //! of the gates which a run leaves empty.
 
+use crate::measure::region::places;
+use crate::plan::Setup;
+use crate::plan::estimators::grid_step_and_bias_m_s;
 use crate::scene::{Estimator, Method, Weighting};
-use crate::setup::Setup;
-use crate::setup::estimators::grid_step_and_bias_m_s;
-use crate::setup::region::places;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use wakescope_estimate::map::PolarPoint;
 
@@ -189,7 +189,7 @@ mod tests {
             let empty: usize = text.split(' ').next().unwrap().parse().unwrap();
             // by the distances themselves
             let (g, scene) = (&planned.geometry, &planned.scene.content);
-            let places: ScanGeometry = crate::setup::region::places(scene, g).unwrap();
+            let places: ScanGeometry = crate::measure::region::places(scene, g).unwrap();
             let windows_m = places.gate_ranges_m();
             let near = |gate_m: &f64| {
                 windows_m

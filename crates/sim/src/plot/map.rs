@@ -11,8 +11,8 @@ use super::drawing::{Anchor, Frame, INK, Shape};
 use super::font::Font;
 use super::frame::{BOTTOM, LEFT, Side, TICK_SIZE, axis, inner, panel, top_room};
 use super::png_file::pixels;
+use crate::beams::SweepMode;
 use crate::io::{OutputError, OutputResult, Unit, VelocityMap};
-use crate::setup::beams::SweepMode;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use tiny_skia::Pixmap;
 

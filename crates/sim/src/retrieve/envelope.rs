@@ -7,7 +7,7 @@ use crate::Error;
 use crate::io::Table;
 use crate::measure::recorded::{Spectra, upward};
 use crate::plan::Plan;
-use crate::setup::estimators;
+use crate::plan::estimators;
 use ndarray::Array3;
 use std::ops::Range;
 use wakescope_estimate::Measured;

@@ -9,10 +9,10 @@ use super::table::{RetrievedScan, refused};
 use crate::detection::strided;
 use crate::io::scans::ReadScan;
 use crate::measure::response::SceneResponse;
+use crate::plan::estimators;
+use crate::plan::instrument::Instrument;
+use crate::progress::Observer;
 use crate::scene::{Flow, RetrievalMethod as Method, Scene, SceneFile};
-use crate::setup::estimators;
-use crate::setup::instrument::Instrument;
-use crate::setup::progress::Observer;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use ndarray::Array2;
 use wakescope_estimate::retrieval::{

@@ -6,8 +6,8 @@
 
 use crate::Error;
 use crate::plan::Plan;
+use crate::plan::wind::vortex_pair;
 use crate::scene::Flow;
-use crate::setup::wind::vortex_pair;
 use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{Side, VortexResult};
 use wakescope_estimate::vortex_fit::{Vortex, Wake};

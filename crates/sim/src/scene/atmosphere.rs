@@ -1,6 +1,7 @@
 //! Aerosol and refractive turbulence of a scene.
 
 use crate::keys::{ABOVE_ZERO_OR_INF, keys};
+use wakescope_signal::Medium;
 
 keys! {
     /// Aerosol and refractive turbulence.
@@ -83,5 +84,55 @@ keys! {
         Kolmogorov = "kolmogorov",
         /// Hill's bump near the inner scale, in Andrews' form.
         HillAndrews = "hill_andrews",
+    }
+}
+
+impl Atmosphere {
+    /// The air that the signal simulation looks through.
+    ///
+    /// # Errors
+    /// Fails if the ranges of a profile do not increase or a value is no coefficient.
+    pub(crate) fn medium(&self) -> Result<Medium, wakescope_signal::Error> {
+        let Some(profile) = &self.profile else {
+            return Medium::uniform(self.backscatter_per_m_sr, self.extinction_per_m);
+        };
+        let mut range_m = profile.range_m.clone();
+        let mut backscatter_per_m_sr = profile.backscatter_per_m_sr.clone();
+        let mut extinction_per_m = profile.extinction_per_m.clone();
+        // Beyond the table the air is as at its end, as far as a second-trip echo at the slowest
+        // pulse repetition frequency.
+        range_m.push(range_m.last().copied().unwrap_or(0.0).max(0.0) + 1e12);
+        backscatter_per_m_sr.extend(profile.backscatter_per_m_sr.last());
+        extinction_per_m.extend(profile.extinction_per_m.last());
+        Medium::new(range_m, backscatter_per_m_sr, extinction_per_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The pulse before comes from 30 000 km at 5 Hz, and from farther at slower rates.
+    #[test]
+    fn a_profile_of_the_air_has_no_end_for_the_echo_of_the_pulse_before() {
+        let profile = AirProfile {
+            range_m: vec![0.0, 1e3],
+            backscatter_per_m_sr: vec![1e-7; 2],
+            extinction_per_m: vec![1e-9; 2],
+        };
+        let air = Atmosphere {
+            profile: Some(profile),
+            ..Atmosphere::default()
+        }
+        .medium()
+        .unwrap();
+        for range_m in [1e4, 3e7, 1.5e11] {
+            let (found, expected) = (air.transmission(range_m).unwrap(), (-1e-9 * range_m).exp());
+            assert!(
+                (found - expected).abs() <= 1e-9 * expected,
+                "{range_m} m: {found} {expected}"
+            );
+            assert_eq!(air.backscatter_per_m_sr(range_m).unwrap(), 1e-7);
+        }
     }
 }

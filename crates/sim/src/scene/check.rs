@@ -11,7 +11,6 @@ use super::{
     SnrReference, SpectrumKind, Turbulence,
 };
 use crate::keys::{Checker, Declared as _, Problem, side};
-use crate::setup::instrument::{medium, pulse};
 
 impl Scene {
     /// Everything in this scene that cannot be simulated; empty for a good scene.
@@ -100,9 +99,12 @@ impl Scene {
         }
         // What is a profile of the air, or a sampled pulse, the simulation of signals knows best.
         if c.is_good() {
-            let (air, pulse) = (medium(&self.atmosphere).err(), pulse(&self.pulse).err());
-            let problems = [("atmosphere.profile", air), ("pulse.shape", pulse)].into_iter();
-            problems.for_each(|(key, e)| e.iter().for_each(|e| c.refuse(key, "", e.to_string())));
+            if let Err(error) = self.atmosphere.medium() {
+                c.refuse("atmosphere.profile", "", error.to_string());
+            }
+            if let Err(error) = self.pulse.simulated() {
+                c.refuse("pulse.shape", "", error.to_string());
+            }
         }
     }
 
@@ -124,7 +126,10 @@ impl Scene {
     /// The 1/e half width sigma of |f|^2 in (7), s; for a sampled pulse that of the Gaussian with the same spread.
     pub fn pulse_sigma_s(&self) -> f64 {
         match &self.pulse.shape {
-            PulseShape::Sampled(_) => pulse(&self.pulse).map_or(f64::NAN, |pulse| pulse.sigma_s()),
+            PulseShape::Sampled(_) => self
+                .pulse
+                .simulated()
+                .map_or(f64::NAN, |pulse| pulse.sigma_s()),
             PulseShape::Gaussian(shape) => shape.duration().sigma_s(),
         }
     }
@@ -285,7 +290,10 @@ impl Scene {
     fn check_ranges(&self, c: &mut Checker<'_>) {
         let (first_m, last_m) = (self.scan.range_min_m, self.scan.range_max_m);
         // Scatterers that a sample sees reach back by the length of the summation of (15), to the last time of the pulse.
-        let last_s = pulse(&self.pulse).map_or(f64::NAN, |pulse| pulse.support_s().1);
+        let last_s = self
+            .pulse
+            .simulated()
+            .map_or(f64::NAN, |pulse| pulse.support_s().1);
         let reach_m = 0.5 * crate::SPEED_OF_LIGHT_M_S * last_s;
         let far = format!("above {reach_m:.3} m, half the length of the pulse in the air");
         let of_pulse = match &self.pulse.shape {

@@ -2,8 +2,8 @@
 //! between them.
 
 use super::Scene;
+use crate::interpolation::interpolate;
 use crate::keys::{Checker, Is, Number, keys};
-use crate::setup::table::of_table;
 use wakescope_estimate::Refinement;
 
 keys! {
@@ -121,7 +121,7 @@ impl Estimator {
             RegionRadius::OfRange {
                 range_m: at_m,
                 radius_m,
-            } => of_table(at_m, radius_m, range_m),
+            } => interpolate(at_m, radius_m, range_m),
             RegionRadius::Target { largest_m, .. } => *largest_m,
             RegionRadius::Fixed {} => self.radius_m,
         }

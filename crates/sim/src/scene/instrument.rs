@@ -4,9 +4,11 @@
 
 use super::Scene;
 use crate::keys::{ABOVE_ZERO_OR_INF, Checker, Number, ZERO_OR_MORE, keys};
+use num_complex::Complex;
 use wakescope_optics::RadiusDefinition;
 use wakescope_optics::plan::Receiver as ReceiverPath;
-use wakescope_signal::{NoiseModel, PulseDuration};
+use wakescope_signal::sampled::SampledPulse;
+use wakescope_signal::{GaussianPulse, NoiseModel, PulseDuration};
 
 keys! {
     /// The laser source.
@@ -187,6 +189,19 @@ keys! {
 }
 
 impl Pulse {
+    /// The pulse that the signal simulation sends.
+    ///
+    /// # Errors
+    /// Fails if the samples of a sampled pulse are no pulse.
+    pub(crate) fn simulated(&self) -> Result<wakescope_signal::Pulse, wakescope_signal::Error> {
+        match &self.shape {
+            PulseShape::Gaussian(shape) => {
+                Ok(GaussianPulse::new(shape.duration(), self.energy_j)?.into())
+            }
+            PulseShape::Sampled(shape) => shape.simulated(self.energy_j),
+        }
+    }
+
     /// Whether it is a Gaussian.
     pub(crate) fn is_gaussian(&self) -> bool {
         matches!(self.shape, PulseShape::Gaussian(_))
@@ -199,6 +214,26 @@ impl PulseShape {
         Self::Gaussian(GaussianShape {
             duration_s,
             ..GaussianShape::default()
+        })
+    }
+}
+
+impl SampledShape {
+    /// The pulse of these samples with an energy, J.
+    fn simulated(&self, energy_j: f64) -> Result<wakescope_signal::Pulse, wakescope_signal::Error> {
+        let sampled = if self.phase_rad.is_empty() {
+            SampledPulse::from_power(&self.time_s, &self.power, energy_j)?
+        } else {
+            let mut envelope = Vec::with_capacity(self.power.len());
+            for (power, phase_rad) in self.power.iter().zip(&self.phase_rad) {
+                envelope.push(Complex::from_polar(power.sqrt(), *phase_rad));
+            }
+            SampledPulse::new(&self.time_s, &envelope, energy_j)?
+        };
+        Ok(if self.centred {
+            sampled.centred().into()
+        } else {
+            sampled.into()
         })
     }
 }

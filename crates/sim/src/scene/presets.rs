@@ -91,9 +91,9 @@ mod tests {
     use crate::measure::bound::bound;
     use crate::measure::budget::{Budget, scan_ranges_m};
     use crate::plan::{Plan, Target};
+    use crate::progress::Silent;
     use crate::run::run;
     use crate::scene::{Scene, SceneFile};
-    use crate::setup::progress::Silent;
     use std::path::Path;
 
     #[test]

@@ -1,8 +1,8 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
 use super::{Flow, NoiseModel, Pattern, Scan, Scene, Weighting};
+use crate::beams::direction::sin_cos_of_turn;
 use crate::keys::{Checker, Is, keys};
-use crate::setup::beams::direction::sin_cos_of_turn;
 use wakescope_estimate::vortex_fit::{LiftSlope, Secondary};
 
 keys! {

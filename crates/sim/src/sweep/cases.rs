@@ -10,7 +10,7 @@ use crate::io::csv_input::TextTable;
 use crate::io::{Provenance, csv::float_text};
 use crate::keys::{Located, Problem, SceneError, to_table, value_at};
 use crate::scene::{Scene, SceneFile, hash_of};
-use crate::setup::streams::stream;
+use crate::streams::stream;
 use rand_xoshiro::rand_core::Rng;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};

@@ -6,8 +6,8 @@
 use crate::measure::response::SceneResponse;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
+use crate::plan::wind::vortex_pair;
 use crate::scene::{Flow, VortexPair};
-use crate::setup::wind::vortex_pair;
 use ndarray::{Array2, s};
 use wakescope_estimate::map::ErrorStatistics;
 use wakescope_estimate::vortex_fit::{

@@ -9,14 +9,14 @@ use crate::measure::cell_average::{CellAverage, error_of_fraction, flagged_fract
 use crate::measure::error_law::shared_cells;
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::profile::Efficiencies;
+use crate::measure::ray_information::range_filter;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
+use crate::plan::estimators;
+use crate::plan::wind::vortex_pair;
+use crate::progress::Observer;
 use crate::run::ScanMiddle;
 use crate::scene::{Flow, NoiseModel};
-use crate::setup::estimators;
-use crate::setup::progress::Observer;
-use crate::setup::ray_information::range_filter;
-use crate::setup::wind::vortex_pair;
 use ndarray::Array2;
 
 /// Cells within this part of the spacing of a pair from a centre are inside its vortices: 8 m of 47.

@@ -10,12 +10,12 @@ use crate::io::{Existing, OutputError, Table};
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::profile::Efficiencies;
 use crate::measure::scan::Scanner;
-use crate::plan::units::seconds;
+use crate::memo::Memo;
+use crate::plan::wind::SceneWind;
 use crate::plan::{Plan, Target};
+use crate::progress::{Observer, Stage};
+use crate::quantities::seconds;
 use crate::scene::{Estimator, Outputs, Scene, SceneFile, Site, WindOfPulses, hash_of};
-use crate::setup::known::Known;
-use crate::setup::progress::{Observer, Stage};
-use crate::setup::wind::SceneWind;
 use crate::{Error, machine, outputs};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -240,8 +240,8 @@ pub fn maps(
 /// Winds, plans of phase screens and efficiencies that scenes have in common, whenever they are measured.
 #[derive(Debug, Default)]
 pub(crate) struct Common {
-    winds: Known<SceneWind>,
-    screens: Known<Vec<ScreenPlan>>,
+    winds: Memo<SceneWind>,
+    screens: Memo<Vec<ScreenPlan>>,
     pub(crate) efficiencies: Efficiencies,
 }
 

@@ -3,8 +3,8 @@
 use super::front::front;
 use super::*;
 use crate::plan::Stage;
+use crate::progress::Observer;
 use crate::scene::{Scene, SceneFile, Weighting};
-use crate::setup::progress::Observer;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::path::Path;
@@ -76,7 +76,7 @@ fn constant_mean_power_gives_the_stored_energies_pulses_and_ratios() {
         let scene = &case.scene.content;
         assert_eq!(scene.pulse.energy_j.to_bits(), of("energy_j").to_bits());
         assert_eq!(scene.scan.pulses_per_line as f64, of("pulses"));
-        let instrument = crate::setup::instrument::Instrument::new(scene).unwrap();
+        let instrument = crate::plan::instrument::Instrument::new(scene).unwrap();
         let efficiency =
             wakescope_optics::theory::free_space_efficiency(&instrument.telescope, 400.0).unwrap();
         let back_per_m = instrument.return_per_m(400.0).unwrap() * efficiency;
@@ -129,8 +129,8 @@ fn resolution_is_the_stored_one() {
             "hann" => Weighting::Hann,
             _ => Weighting::Gaussian,
         };
-        let pulse = crate::setup::instrument::pulse(&scene.pulse).unwrap();
-        let window = crate::setup::estimators::weighting(&scene)
+        let pulse = scene.pulse.simulated().unwrap();
+        let window = crate::plan::estimators::weighting(&scene)
             .weights(number(1) as usize)
             .unwrap();
         let filter = RangeFilter::gate(&pulse, &window, number(2), 0.3).unwrap();

@@ -1,11 +1,11 @@
 //! The estimates of a run as a map for files and pictures.
 //! Check: the tests of the program read the files.
 
+use crate::beams::SweepMode;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::measure::map::VelocityEstimates;
 use crate::plan::Plan;
-use crate::setup::beams::SweepMode;
-use crate::setup::described::pulse_info;
+use crate::plan::described::pulse_info;
 use ndarray::Array2;
 use std::f64::consts::FRAC_PI_2;
 

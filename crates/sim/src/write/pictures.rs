@@ -2,13 +2,13 @@
 //! Check: by eye; a test of the program compares the names of the files.
 
 use crate::Error;
+use crate::beams::{Direction, SweepMode};
 use crate::io::VelocityMap;
 use crate::measure::beam_winds::BeamWind;
 use crate::measure::profile::RangeProfile;
 use crate::plan::Plan;
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 use crate::scene::{Flow, SnrReference};
-use crate::setup::beams::{Direction, SweepMode};
 use wakescope_optics::EfficiencyProfile;
 
 /// Signal-to-noise ratio and efficiency against range, each with its standard error as a band.
@@ -320,7 +320,7 @@ fn title(plan: &Plan, has_gaps: bool) -> String {
 fn centres_m(plan: &Plan) -> Vec<(f64, f64)> {
     match &plan.scene.content.flow {
         Flow::VortexPair(pair) => {
-            let c = crate::setup::wind::vortex_pair(pair).centres(plan.wind.start_s);
+            let c = crate::plan::wind::vortex_pair(pair).centres(plan.wind.start_s);
             vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
         }
         _ => Vec::new(),

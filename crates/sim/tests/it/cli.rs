@@ -4,8 +4,8 @@ use super::wakescope;
 use std::path::Path;
 use wakescope_sim::io::Existing;
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::SceneFile;
-use wakescope_sim::setup::progress::Silent;
 use wakescope_sim::write;
 
 /// A scene small enough to run in a moment.

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
 use wakescope_sim::run::{RunResult, run};
 use wakescope_sim::scene::SceneFile;
-use wakescope_sim::setup::progress::Silent;
 
 fn plan(words: &str, target: Target) -> Plan {
     let text = format!(

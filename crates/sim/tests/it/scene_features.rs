@@ -5,11 +5,11 @@ use num_complex::Complex;
 use std::path::Path;
 use wakescope_estimate::{Scratch, SignalKind, window::Sample};
 use wakescope_sim::measure::map::VelocityEstimates;
+use wakescope_sim::plan::estimators::{self, Toolkit};
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
 use wakescope_sim::run::{RunResult, run};
 use wakescope_sim::scene::{NoiseModel, SceneFile};
-use wakescope_sim::setup::estimators::{self, Toolkit};
-use wakescope_sim::setup::progress::Silent;
 
 /// A scene with a few lines; the pieces replace the words in capitals.
 const SCENE: &str = r#"

@@ -7,8 +7,8 @@ use wakescope_les::{GridSnapshot, Wind};
 use wakescope_sim::flow::{Begin, CaseFile};
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::SceneFile;
-use wakescope_sim::setup::progress::Silent;
 use wakescope_sim::{Error, run};
 
 /// A pair over a sticky ground in the units of b0 and V0, three planes.

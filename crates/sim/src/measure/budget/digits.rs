@@ -2,7 +2,7 @@
 //!
 //! Check: prefixes join without a gap, and no digit is lost.
 
-use crate::plan::units::rounded;
+use crate::quantities::rounded;
 
 /// A number in three digits with a prefix of its unit.
 pub(super) fn si(value: f64, unit: &str) -> String {

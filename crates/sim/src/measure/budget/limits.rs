@@ -1,11 +1,11 @@
 //! What bounds an instrument beside its signal-to-noise ratio: power, ranges, velocities, phase noise, local oscillator, resolution.
 
 use super::digits::si;
+use crate::measure::ray_information::range_filter;
 use crate::plan::Plan;
+use crate::plan::described::sampled_velocities_m_s;
+use crate::plan::estimators;
 use crate::scene::Weighting;
-use crate::setup::described::sampled_velocities_m_s;
-use crate::setup::estimators;
-use crate::setup::ray_information::range_filter;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use wakescope_signal::RangeFilter;
 use wakescope_signal::constants::ELEMENTARY_CHARGE_C;

@@ -10,12 +10,12 @@ pub use limits::Limits;
 
 use crate::Error;
 use crate::io::Table;
+use crate::measure::efficiency_model::turbulence;
 use crate::measure::profile::{Efficiencies, LineOptics, efficiency_by_theory, free_space};
 use crate::plan::Plan;
+use crate::plan::instrument::Instrument;
+use crate::progress::Observer;
 use crate::scene::{Digitiser, FrontEnd, Scene, SnrReference};
-use crate::setup::efficiency_model::turbulence;
-use crate::setup::instrument::Instrument;
-use crate::setup::progress::Observer;
 use digits::{scientific, si};
 use std::f64::consts::{LN_2, PI};
 
@@ -467,9 +467,9 @@ fn second_trip(scene: &Scene, instrument: &Instrument, range_m: f64) -> Result<f
 mod tests {
     use super::*;
     use crate::plan::Target;
+    use crate::progress::Silent;
     use crate::run::run;
     use crate::scene::{ReceiverPath, RefractiveTurbulence, SceneFile, SecondTrip, Turbulence};
-    use crate::setup::progress::Silent;
 
     fn budget(text: &str, range_m: &[f64]) -> Budget {
         let file = SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap();

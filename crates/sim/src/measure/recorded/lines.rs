@@ -31,13 +31,13 @@ impl RayTable {
     /// A table that cannot be read, without an elevation, or with a cell that is no number.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let table = TextTable::read(path)?;
-        Self::of_table(&table, path).map_err(|reason| Error::Input {
+        Self::interpolate(&table, path).map_err(|reason| Error::Input {
             path: path.to_owned(),
             reason,
         })
     }
 
-    fn of_table(table: &TextTable, path: &Path) -> Result<Self, String> {
+    fn interpolate(table: &TextTable, path: &Path) -> Result<Self, String> {
         let known = |name: &str, values: Vec<f64>| match values.iter().position(|v| !v.is_finite())
         {
             Some(row) => Err(format!("row {}: {name} is no number", row + 1)),
@@ -110,7 +110,7 @@ pub(super) fn scans(
     let count = records.records;
     let per_line = plan.scene.content.scan.pulses_per_line;
     let (elevation_rad, time_s) = match table {
-        Some(table) => of_table(table, count, per_line)?,
+        Some(table) => interpolate(table, count, per_line)?,
         None => match &records.about.elevation_rad {
             Some(elevation_rad) => (elevation_rad.clone(), records.about.time_s.clone()),
             None => (of_scene(plan, records)?, records.about.time_s.clone()),
@@ -219,7 +219,7 @@ pub(super) fn scans(
 }
 
 /// Angles and times of all records from those of records or lines.
-fn of_table(
+fn interpolate(
     table: &RayTable,
     count: usize,
     per_line: usize,

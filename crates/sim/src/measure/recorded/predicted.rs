@@ -4,14 +4,14 @@
 //! Check: at the ratio of the scene, the bound of the scene; the mean error of very many windows.
 
 use crate::Error;
+use crate::interpolation::interpolate;
 use crate::io::Table;
 use crate::measure::map::VelocityEstimates;
+use crate::measure::ray_information::RayInformation;
+use crate::measure::region::places;
 use crate::plan::Plan;
+use crate::plan::estimators::ExpectedBias;
 use crate::scene::NoiseModel;
-use crate::setup::estimators::ExpectedBias;
-use crate::setup::ray_information::RayInformation;
-use crate::setup::region::places;
-use crate::setup::table::of_table;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry};
 use wakescope_estimate::polar_points;
 
@@ -84,7 +84,7 @@ impl PredictedError {
                 .ln()
         };
         let ends = [information(below), information(below + 1)];
-        (of_table(&self.snr_db[below..below + 2], &ends, snr_db).exp() * level / whole)
+        (interpolate(&self.snr_db[below..below + 2], &ends, snr_db).exp() * level / whole)
             .sqrt()
             .recip()
     }

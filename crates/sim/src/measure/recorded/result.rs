@@ -10,7 +10,7 @@ use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::measure::gate_estimates::GateSums;
 use crate::plan::Plan;
-use crate::setup::described::pulse_info;
+use crate::plan::described::pulse_info;
 use ndarray::{Array2, Axis, concatenate};
 use wakescope_estimate::estimators::noise_floor;
 use wakescope_estimate::map::PolarPoint;

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::io::OutputError;
 use crate::measure::map_estimator::{MapEstimator, places_of};
 use crate::plan::Plan;
-use crate::setup::estimators;
+use crate::plan::estimators;
 use ndarray::ArrayView2;
 use wakescope_estimate::map::PolarPoint;
 use wakescope_estimate::spectrum::LagSpectrum;

@@ -2,12 +2,12 @@
 //! Check: an RHI has the lines and times of before; what a list or the ground forbids is refused with its key.
 
 use crate::Error;
+use crate::beams::path::{self, Stop};
+use crate::beams::schedule::{Pace, Schedule};
+use crate::beams::{Head, Mount};
 use crate::io::scan_list;
 use crate::keys::Problem;
 use crate::scene::{HeadMotion, Outside, Pattern, Scene, SceneFile, SweepDirection, Towards};
-use crate::setup::beams::path::{self, Stop};
-use crate::setup::beams::schedule::{Pace, Schedule};
-use crate::setup::beams::{Head, Mount};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::PathBuf;
 
@@ -145,9 +145,7 @@ fn above_ground(file: &SceneFile, scan: &Schedule) -> Result<(), Error> {
     if s.below_ground != (Outside::Error {}) {
         return Ok(());
     }
-    let low = |beam: &crate::setup::beams::Beam| {
-        beam.position_m[2].min(beam.at_range_m(s.range_max_m)[2])
-    };
+    let low = |beam: &crate::beams::Beam| beam.position_m[2].min(beam.at_range_m(s.range_max_m)[2]);
     let Some(lowest) = scan
         .ends()
         .min_by(|a, b| low(a).total_cmp(&low(b)))

@@ -3,8 +3,8 @@
 //! Free space is a quadrature. Turbulence on independent paths (bistatic) has an exact mean at any strength.
 //! Only turbulence that both beams share (monostatic) needs phase screens.
 
+use crate::plan::geometry::Geometry;
 use crate::scene::{EfficiencyOfPulse, RefractiveTurbulence, Scene, SnrReference, Turbulence};
-use crate::setup::geometry::Geometry;
 use wakescope_optics::Cn2Path;
 use wakescope_optics::plan::{Model, cheapest_model};
 

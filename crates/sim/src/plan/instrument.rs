@@ -1,12 +1,11 @@
 //! The instrument of a scene and the air that it looks through, in the words of optics and signals: made once, and handed on.
 
 use crate::Error;
+use crate::measure::efficiency_model::turbulence as turbulence_of;
 use crate::scene::{
-    AirProfile, Atmosphere, DetectorSignal, Digitiser, NoiseModel, Pulse, PulseShape,
-    RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind,
+    DetectorSignal, Digitiser, NoiseModel, RefractiveTurbulence, Scene, ScreenSampling,
+    SnrReference, SpectrumKind,
 };
-use crate::setup::efficiency_model::turbulence as turbulence_of;
-use num_complex::Complex;
 use std::sync::Arc;
 use wakescope_optics::{self as optics, plan::Plan as ScreenPlan};
 use wakescope_signal as signal;
@@ -52,11 +51,11 @@ impl Instrument {
         let turbulence = turbulence_of(scene).map(|t| turbulence(&t)).transpose()?;
         Ok(Self {
             telescope,
-            pulse: pulse(&scene.pulse)?,
+            pulse: scene.pulse.simulated()?,
             receiver,
             digitiser,
             turbulence,
-            air: medium(&scene.atmosphere)?,
+            air: scene.atmosphere.medium()?,
             transmission: 10f64.powf(-0.1 * scene.telescope.optics_loss_db),
             blind_range_m: scene.telescope.blind_range_m,
         })
@@ -192,65 +191,6 @@ fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Er
     })
 }
 
-/// The pulse of a scene.
-///
-/// # Errors
-/// What the signal simulation refuses, such as samples that are no pulse.
-pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
-    match &p.shape {
-        PulseShape::Gaussian(shape) => {
-            Ok(signal::GaussianPulse::new(shape.duration(), p.energy_j)?.into())
-        }
-        PulseShape::Sampled(shape) => {
-            let sampled = if shape.phase_rad.is_empty() {
-                signal::sampled::SampledPulse::from_power(&shape.time_s, &shape.power, p.energy_j)?
-            } else {
-                let polar =
-                    |(power, phase): (&f64, &f64)| Complex::from_polar(power.sqrt(), *phase);
-                let envelope: Vec<_> = shape
-                    .power
-                    .iter()
-                    .zip(&shape.phase_rad)
-                    .map(polar)
-                    .collect();
-                signal::sampled::SampledPulse::new(&shape.time_s, &envelope, p.energy_j)?
-            };
-            Ok(if shape.centred {
-                sampled.centred().into()
-            } else {
-                sampled.into()
-            })
-        }
-    }
-}
-
-/// The air of a scene that changes with range; none where it is uniform.
-///
-/// # Errors
-/// What the signal simulation refuses, such as ranges that do not increase.
-pub(crate) fn medium(atmosphere: &Atmosphere) -> Result<signal::Medium, Error> {
-    let Some(profile) = &atmosphere.profile else {
-        return Ok(signal::Medium::uniform(
-            atmosphere.backscatter_per_m_sr,
-            atmosphere.extinction_per_m,
-        )?);
-    };
-    let AirProfile {
-        mut range_m,
-        mut backscatter_per_m_sr,
-        mut extinction_per_m,
-    } = profile.clone();
-    // Beyond the table the air is as at its end, to where the echo of the pulse before may come from at the slowest rate.
-    range_m.push(range_m.last().copied().unwrap_or(0.0).max(0.0) + 1e12);
-    backscatter_per_m_sr.extend(profile.backscatter_per_m_sr.last());
-    extinction_per_m.extend(profile.extinction_per_m.last());
-    Ok(signal::Medium::new(
-        range_m,
-        backscatter_per_m_sr,
-        extinction_per_m,
-    )?)
-}
-
 /// The receiver of a scene.
 pub fn receiver(scene: &Scene) -> signal::Receiver {
     let d = &scene.detector;
@@ -309,33 +249,5 @@ fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
         clipping_noise: converter.map_or(0.0, |converter| converter.clipping_noise()),
         linewidth_hz: scene.laser.linewidth_hz,
         reflection: 10f64.powf(0.1 * scene.telescope.reflection_db),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The pulse before comes from 30 000 km at 5 Hz, and from farther at slower rates.
-    #[test]
-    fn a_profile_of_the_air_has_no_end_for_the_echo_of_the_pulse_before() {
-        let profile = AirProfile {
-            range_m: vec![0.0, 1e3],
-            backscatter_per_m_sr: vec![1e-7; 2],
-            extinction_per_m: vec![1e-9; 2],
-        };
-        let air = medium(&Atmosphere {
-            profile: Some(profile),
-            ..Atmosphere::default()
-        })
-        .unwrap();
-        for range_m in [1e4, 3e7, 1.5e11] {
-            let (found, expected) = (air.transmission(range_m).unwrap(), (-1e-9 * range_m).exp());
-            assert!(
-                (found - expected).abs() <= 1e-9 * expected,
-                "{range_m} m: {found} {expected}"
-            );
-            assert_eq!(air.backscatter_per_m_sr(range_m).unwrap(), 1e-7);
-        }
     }
 }

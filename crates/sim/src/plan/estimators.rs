@@ -1,9 +1,9 @@
 //! The estimator of a scene in the words of `estimate`: statistic of the windows, estimator of their mean, models of both.
 
 use crate::Error;
+use crate::interpolation::{interpolate, linspace};
+use crate::plan::instrument::Instrument;
 use crate::scene::{DetectorSignal, Method, NoiseModel, PulseShape, Scene, Weighting};
-use crate::setup::instrument::Instrument;
-use crate::setup::table::{of_table, spaced};
 use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate::bound::{Noise, RecordModel, WindowModel};
@@ -277,7 +277,7 @@ impl NoiseSeen {
         let pulse = pulse_correlation(scene, &instrument.pulse);
         let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
         let cells = n as f64 * scene.detector.bandwidth_hz / scene.detector.sampling_hz;
-        let velocity_m_s = spaced(
+        let velocity_m_s = linspace(
             low_m_s,
             high_m_s,
             (8.0 * cells).ceil().clamp(65.0, 257.0) as usize,
@@ -307,7 +307,7 @@ impl NoiseSeen {
         if velocity_m_s.is_nan() {
             f64::NAN
         } else {
-            of_table(&self.gain.0, &self.gain.1, velocity_m_s)
+            interpolate(&self.gain.0, &self.gain.1, velocity_m_s)
         }
     }
 }

@@ -3,10 +3,10 @@
 //! Check: the truth of a line is the mean over its pulses.
 
 use crate::Error;
+use crate::beams::Beam;
+use crate::plan::Setup;
+use crate::plan::geometry::Geometry;
 use crate::scene::{Outside, WindOfPulses};
-use crate::setup::Setup;
-use crate::setup::beams::Beam;
-use crate::setup::geometry::Geometry;
 use wakescope_signal::RangeFilter;
 
 /// The air of the layers along a beam.

@@ -3,11 +3,11 @@
 //! Check: a right-handed file with one vortex comes out unmirrored; a field off the cross-plane is what it says.
 
 use crate::Error;
+use crate::beams::direction::sin_cos_of_turn;
 use crate::io::fields_input::{FieldPlace, places, read};
 use crate::io::planes_input::files;
+use crate::plan::wind::SceneWind;
 use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
-use crate::setup::beams::direction::sin_cos_of_turn;
-use crate::setup::wind::SceneWind;
 use wakescope_les::winds::{Edges, Series, Side, VolumeComponent, VolumeSnapshot};
 use wakescope_les::{Error as LesError, Wind};
 
@@ -74,7 +74,7 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
         path: field.path.clone(),
         reason,
     };
-    // The period that the file states, or of evenly spaced nodes; faces and centres have the same.
+    // The period that the file states, or of evenly linspace nodes; faces and centres have the same.
     let along = |direction: usize, periodic: bool| -> Result<Edges, Error> {
         let nodes_m = &components[direction].nodes_m[direction];
         let (Some(first), Some(second), Some(last)) =

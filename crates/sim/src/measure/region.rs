@@ -2,11 +2,11 @@
 //!
 //! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
 
+use crate::interpolation::interpolate;
+use crate::measure::ray_information::RayInformation;
+use crate::plan::geometry::Geometry;
 use crate::scene::{RegionRadius, Scene};
-use crate::setup::geometry::Geometry;
-use crate::setup::ray_information::RayInformation;
-use crate::setup::table::of_table;
-use crate::{Error, setup::estimators};
+use crate::{Error, plan::estimators};
 use wakescope_estimate::{Radius, map::ScanGeometry};
 
 /// Where the windows of a scan are: in one plane if it is a plain RHI, else on a sphere.
@@ -82,7 +82,7 @@ pub(crate) fn region_radius(
                 .collect::<Vec<f64>>()
         };
         (0..count)
-            .map(|gates| of_table(&range_m, &of(gates), at_m))
+            .map(|gates| interpolate(&range_m, &of(gates), at_m))
             .collect()
     };
     Ok(Radius::for_standard_deviation(
@@ -108,7 +108,7 @@ mod tests {
             (4.0, 0.0),
             (9.0, 0.0),
         ] {
-            assert_eq!(of_table(&x, &y, at), expected, "{at}");
+            assert_eq!(interpolate(&x, &y, at), expected, "{at}");
         }
     }
 }

@@ -6,15 +6,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Values by the hash of what they depend on.
 #[derive(Debug)]
-pub(crate) struct Known<T>(Mutex<HashMap<String, Arc<T>>>);
+pub(crate) struct Memo<T>(Mutex<HashMap<String, Arc<T>>>);
 
-impl<T> Default for Known<T> {
+impl<T> Default for Memo<T> {
     fn default() -> Self {
         Self(Mutex::new(HashMap::new()))
     }
 }
 
-impl<T> Known<T> {
+impl<T> Memo<T> {
     /// The value of a cause, made if it is not known; one at a time.
     ///
     /// # Errors

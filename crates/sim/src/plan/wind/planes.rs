@@ -5,8 +5,8 @@
 use crate::Error;
 use crate::io::CrossPlanes;
 use crate::io::planes_input::{files, read};
+use crate::plan::wind::SceneWind;
 use crate::scene::{SceneFile, SimulatedFlow};
-use crate::setup::wind::SceneWind;
 use wakescope_les::winds::{Edges, PlaneMesh, Series, Side};
 use wakescope_les::{Error as LesError, GridSnapshot};
 

@@ -3,9 +3,9 @@
 //! Check: the stored bound of one window; estimates of whole regions, which no bound may pass.
 
 use crate::Error;
+use crate::plan::Setup;
+use crate::plan::estimators;
 use crate::scene::NoiseModel;
-use crate::setup::Setup;
-use crate::setup::estimators;
 use wakescope_estimate::bound::RecordModel;
 use wakescope_signal::RangeFilter;
 

@@ -4,10 +4,10 @@
 
 use crate::Error;
 use crate::SPEED_OF_LIGHT_M_S;
+use crate::beams::Schedule;
+use crate::plan::scan_lines;
+use crate::plan::wind::SceneWind;
 use crate::scene::SceneFile;
-use crate::setup::beams::Schedule;
-use crate::setup::scan_lines;
-use crate::setup::wind::SceneWind;
 use wakescope_signal::{LayerLimits, Pulse};
 
 /// The sampling of one scan in angle, range and time.

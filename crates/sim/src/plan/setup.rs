@@ -1,40 +1,11 @@
-//! What is made of a scene before anything is planned or run: instrument, estimators, wind, the beams and their samples.
-//!
-//! | module | what is in it |
-//! |---|---|
-//! | [`instrument`], [`estimators`] | a scene in the words of the other crates |
-//! | [`wind`], `air` | the wind: analytic, or the planes of a simulated flow; the wind along beams |
-//! | [`beams`], `scan_lines` | when, from where and in which direction each pulse leaves |
-//! | [`geometry`], `sizes` | lines of sight, samples, gates, layers; sizes that plan and run share |
-//! | `efficiency_model` | the cheapest model of the efficiency that is valid, and the ranges at which it is computed |
-//! | `region`, `ray_information` | the radius of regions; what a pulse tells of the velocity about a range |
-//! | `described` | pulse and site as files carry them |
-//! | `table`, `known` | tables of numbers and straight lines between them; what several scenes share |
-//! | [`progress`], [`streams`] | stages of a run and who is told of them; one random stream for each pulse |
-
-pub(crate) mod air;
-pub mod beams;
-pub(crate) mod described;
-pub(crate) mod efficiency_model;
-pub mod estimators;
-pub mod geometry;
-pub mod instrument;
-pub(crate) mod known;
-pub mod progress;
-pub(crate) mod ray_information;
-pub(crate) mod region;
-pub(crate) mod scan_lines;
-pub(crate) mod sizes;
-pub mod streams;
-pub(crate) mod table;
-pub mod wind;
+//! A scene with its instrument, geometry and wind.
 
 use crate::Error;
+use crate::plan::geometry::Geometry;
+use crate::plan::instrument::Instrument;
+use crate::plan::wind::SceneWind;
 use crate::scene::{Flow, SceneFile};
-use geometry::Geometry;
-use instrument::Instrument;
 use std::sync::Arc;
-use wind::SceneWind;
 
 /// A scene with what is made of it.
 #[derive(Debug)]
