@@ -8,7 +8,7 @@ use pyo3::types::PySlice;
 use std::ops::Range;
 use std::path::Path;
 use wakescope_sim::io::number::middle_code;
-use wakescope_sim::io::raw::{RawRecords, Source};
+use wakescope_sim::io::raw::{RawRecords, RecordSource};
 
 /// An array \[record, sample\].
 #[derive(Debug)]
@@ -30,7 +30,7 @@ impl NumpyRecords {
     }
 }
 
-impl Source for NumpyRecords {
+impl RecordSource for NumpyRecords {
     fn read(
         &mut self,
         records: Range<usize>,

@@ -147,6 +147,14 @@ impl Error {
         }
     }
 
+    /// A file that does not hold what it should, with the reason.
+    pub(crate) fn input(path: &std::path::Path, reason: impl Into<String>) -> Self {
+        Self::Input {
+            path: path.to_owned(),
+            reason: reason.into(),
+        }
+    }
+
     /// What the system says of a file or folder.
     pub(crate) fn io(
         action: &'static str,

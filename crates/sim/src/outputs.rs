@@ -3,7 +3,7 @@
 //! Check: the names that commands announce are those that they write; folders in use, in the way or not writable are refused.
 
 use crate::Error;
-use crate::io::atomic::{Stage, in_folder};
+use crate::io::atomic::{StagingFolder, in_folder};
 use crate::io::lock::FolderLock;
 use crate::io::{Existing, FileGroup, Provenance, Table};
 #[cfg(feature = "plots")]
@@ -187,7 +187,7 @@ pub(crate) fn prepare(
 ) -> Result<(), Error> {
     existing.check(folder, names.iter().map(String::as_str))?;
     in_folder(folder, false, || {
-        drop(Stage::make(folder)?);
+        drop(StagingFolder::make(folder)?);
         Ok(alone
             .then(|| FolderLock::take(folder))
             .transpose()

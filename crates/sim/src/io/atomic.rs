@@ -75,60 +75,51 @@ impl FileGroup {
     }
 
     fn commit_inside(&self) -> OutputResult<Vec<PathBuf>> {
-        let stage = self.begin()?;
-        self.write(&stage.name())?;
-        self.put(&stage)
+        let staging = self.begin()?;
+        self.write(&staging.name())?;
+        self.put(&staging)
     }
 
     /// Makes a hidden folder with the files, which lack their content yet. The folder of the group must exist.
     ///
     /// # Errors
     /// The first refusal of the system.
-    pub(crate) fn begin(&self) -> OutputResult<Stage> {
-        let stage = Stage::make(&self.folder)?;
+    pub(crate) fn begin(&self) -> OutputResult<StagingFolder> {
+        let staging = StagingFolder::make(&self.folder)?;
         for (name, content) in &self.files {
-            let path = stage.new.join(name);
+            let path = staging.new.join(name);
             let made = fs::File::create_new(&path).and_then(|file| file.set_len(content.length));
-            made.map_err(|e| io_error("write", &path, e))?;
+            made.map_err(|e| OutputError::io("write", &path, e))?;
         }
-        Ok(stage)
+        Ok(staging)
     }
 
-    /// Writes the parts that are here into the stage of that name, and waits until they are on disk.
+    /// Writes the parts that are here into the staging folder of that name, and waits until they are on disk.
     ///
     /// # Errors
     /// The first refusal of the system.
-    pub(crate) fn write(&self, stage: &str) -> OutputResult<()> {
-        let write = |path: &Path, content: &FileParts| {
-            let mut file = fs::OpenOptions::new().write(true).open(path)?;
-            for (start, bytes) in &content.parts {
-                file.seek(SeekFrom::Start(*start))?;
-                file.write_all(bytes)?;
+    pub(crate) fn write(&self, staging: &str) -> OutputResult<()> {
+        for (name, content) in &self.files {
+            if content.parts.is_empty() {
+                continue;
             }
-            file.sync_all()
-        };
-        for (name, content) in self
-            .files
-            .iter()
-            .filter(|(_, content)| !content.parts.is_empty())
-        {
-            let path = self.folder.join(stage).join(NEW).join(name);
-            write(&path, content).map_err(|e| io_error("write", &path, e))?;
+            let path = self.folder.join(staging).join(NEW).join(name);
+            write_parts(&path, content).map_err(|e| OutputError::io("write", &path, e))?;
         }
         Ok(())
     }
 
-    /// Puts the files of a stage, which are whole, into place; returns their paths.
+    /// Puts the files of a staging folder, which are whole, into place; returns their paths.
     ///
     /// # Errors
     /// The first refusal of the system. The folder is then as it was before.
-    pub(crate) fn put(&self, stage: &Stage) -> OutputResult<Vec<PathBuf>> {
+    pub(crate) fn put(&self, staging: &StagingFolder) -> OutputResult<Vec<PathBuf>> {
         for (place, (name, _)) in self.files.iter().enumerate() {
             // After the last one nothing can fail, so that what it replaces need not be kept: in one step, for others may do the same.
-            if let Err(error) = self.put_one(stage, name, place + 1 == self.files.len()) {
+            if let Err(error) = self.put_one(staging, name, place + 1 == self.files.len()) {
                 for (name, _) in self.files[..place].iter().rev() {
                     let target = self.folder.join(name);
-                    let kept = stage.old.join(name);
+                    let kept = staging.old.join(name);
                     let was_there = kept.symlink_metadata().is_ok();
                     drop(if was_there {
                         fs::rename(kept, target)
@@ -148,26 +139,26 @@ impl FileGroup {
             .collect())
     }
 
-    /// Puts one file into place; an older one waits in the stage, but for the last file.
-    fn put_one(&self, stage: &Stage, name: &str, is_last: bool) -> OutputResult<()> {
+    /// Puts one file into place; an older one stays in the staging folder, except for the last file.
+    fn put_one(&self, staging: &StagingFolder, name: &str, is_last: bool) -> OutputResult<()> {
         let target = self.folder.join(name);
-        let kept = stage.old.join(name);
+        let kept = staging.old.join(name);
         if target.is_dir() {
             let source = std::io::Error::new(
                 ErrorKind::IsADirectory,
                 "a folder of that name is in the way",
             );
-            return Err(io_error("write", &target, source));
+            return Err(OutputError::io("write", &target, source));
         }
         let keeps = !is_last && target.symlink_metadata().is_ok();
         if keeps {
-            fs::rename(&target, &kept).map_err(|e| io_error("replace", &target, e))?;
+            fs::rename(&target, &kept).map_err(|e| OutputError::io("replace", &target, e))?;
         }
-        fs::rename(stage.new.join(name), &target).map_err(|source| {
+        fs::rename(staging.new.join(name), &target).map_err(|source| {
             if keeps {
                 drop(fs::rename(&kept, &target));
             }
-            io_error("write", &target, source)
+            OutputError::io("write", &target, source)
         })
     }
 }
@@ -193,7 +184,7 @@ pub fn write_atomic(path: &Path, content: impl Into<Vec<u8>>) -> OutputResult<()
 
 /// Hidden folder for the new and the replaced files; removed when dropped.
 #[derive(Debug)]
-pub(crate) struct Stage {
+pub(crate) struct StagingFolder {
     root: PathBuf,
     new: PathBuf,
     old: PathBuf,
@@ -203,44 +194,78 @@ pub(crate) struct Stage {
 
 /// What the folder of the new files in it is called.
 const NEW: &str = "new";
-/// How the names of stage folders begin.
+/// How the names of staging folders begin.
 const STAGE: &str = ".wakescope-stage-";
-/// Name of the file in a stage that its maker holds locked.
+/// Name of the file in a staging folder that its maker holds locked.
 const LOCK: &str = "lock";
 
-/// Removes the stages that crashed processes left in a folder; those of processes that live, and links, are left alone. A group
-/// that was not put into place as a whole is taken back as far as the files are still there.
+/// Removes the staging folders that crashed processes left in a folder; those of running processes, and links, stay. Files that
+/// a crashed process had replaced only in part are put back as far as they still exist.
 pub(super) fn sweep_stages(folder: &Path) {
-    let entries = |path: &Path| fs::read_dir(path).into_iter().flatten().flatten();
-    let is_stage = |entry: &fs::DirEntry| {
-        entry.file_name().to_string_lossy().starts_with(STAGE)
-            && entry.file_type().is_ok_and(|kind| kind.is_dir())
-    };
-    let path = |entry: fs::DirEntry| entry.path();
-    for root in entries(folder).filter(is_stage).map(path) {
+    for root in entries(folder) {
+        if !is_staging_folder(&root) {
+            continue;
+        }
         let Ok(lock) = fs::File::open(root.join(LOCK)) else {
-            // Not yet locked, or left by a crash there and then: empty, it may go, and its maker takes another name.
+            // Not yet locked, or left by a crash before that: an empty folder is removed, and its maker takes another name.
             drop(fs::remove_dir(&root));
             continue;
         };
         if lock.try_lock().is_err() {
             continue;
         }
-        let stage = Stage::of(root, lock);
-        // Links in it lead to folders of others, too.
-        let is_folder = |path: &Path| path.symlink_metadata().is_ok_and(|about| about.is_dir());
-        if is_folder(&stage.new) && is_folder(&stage.old) && entries(&stage.new).next().is_some() {
-            for kept in entries(&stage.old).map(path) {
-                if let Some(name) = kept.file_name() {
-                    drop(fs::rename(&kept, folder.join(name)));
+        let staging = StagingFolder::from_root(root, lock);
+        // Links in it may lead to folders of other programs.
+        let are_folders = is_folder(&staging.new) && is_folder(&staging.old);
+        if are_folders && !entries(&staging.new).is_empty() {
+            for replaced in entries(&staging.old) {
+                if let Some(name) = replaced.file_name() {
+                    drop(fs::rename(&replaced, folder.join(name)));
                 }
             }
         }
-        // Dropping the stage removes it.
+        // Dropping the staging folder removes it.
     }
 }
 
-impl Stage {
+/// Paths in a folder; none if it cannot be read.
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    let mut paths = Vec::new();
+    if let Ok(entries) = fs::read_dir(folder) {
+        for entry in entries.flatten() {
+            paths.push(entry.path());
+        }
+    }
+    paths
+}
+
+/// Whether the path is a folder, and no link to one.
+fn is_folder(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|about| about.is_dir())
+}
+
+/// Whether the path is a folder with the name of a staging folder.
+fn is_staging_folder(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().starts_with(STAGE) && is_folder(path)
+}
+
+/// Writes the parts into an existing file and waits until they are on disk.
+fn write_parts(path: &Path, content: &FileParts) -> std::io::Result<()> {
+    let mut file = fs::OpenOptions::new().write(true).open(path)?;
+    for (start, bytes) in &content.parts {
+        file.seek(SeekFrom::Start(*start))?;
+        file.write_all(bytes)?;
+    }
+    file.sync_all()
+}
+
+/// Removes a folder with its content; returns whether it no longer exists.
+fn remove_folder(path: &Path) -> bool {
+    fs::remove_dir_all(path).is_ok() || path.symlink_metadata().is_err()
+}
+
+impl StagingFolder {
     /// The name of the folder.
     pub(crate) fn name(&self) -> String {
         self.root
@@ -250,7 +275,7 @@ impl Stage {
             .into_owned()
     }
 
-    fn of(root: PathBuf, lock: fs::File) -> Self {
+    fn from_root(root: PathBuf, lock: fs::File) -> Self {
         Self {
             new: root.join(NEW),
             old: root.join("old"),
@@ -259,7 +284,7 @@ impl Stage {
         }
     }
 
-    /// Makes the stage of a folder.
+    /// Makes the staging folder of a folder.
     ///
     /// # Errors
     /// Files cannot be written there.
@@ -269,16 +294,16 @@ impl Stage {
             match fs::create_dir(&root) {
                 Ok(()) => {}
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => continue,
-                Err(e) => return Err(io_error("write into", folder, e)),
+                Err(e) => return Err(OutputError::io("write into", folder, e)),
             }
             match Self::begin(&root) {
-                Ok(stage) => return Ok(stage),
+                Ok(staging) => return Ok(staging),
                 // Before it was locked somebody took it for one that was left.
                 Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::WouldBlock) => {}
-                Err(e) => return Err(io_error("create folder", &root, e)),
+                Err(e) => return Err(OutputError::io("create folder", &root, e)),
             }
         }
-        Err(io_error(
+        Err(OutputError::io(
             "write into",
             folder,
             ErrorKind::AlreadyExists.into(),
@@ -292,26 +317,24 @@ impl Stage {
             Err(fs::TryLockError::Error(e)) if e.kind() == ErrorKind::Unsupported => {}
             tried => tried?,
         }
-        let stage = Self::of(root.to_owned(), lock);
-        fs::create_dir(&stage.new)?;
-        fs::create_dir(&stage.old)?;
-        Ok(stage)
+        let staging = Self::from_root(root.to_owned(), lock);
+        fs::create_dir(&staging.new)?;
+        fs::create_dir(&staging.old)?;
+        Ok(staging)
     }
 }
 
-impl Drop for Stage {
+impl Drop for StagingFolder {
     fn drop(&mut self) {
-        // The lock goes last: without it a stage that is not empty is nobody's to sweep.
-        let goes =
-            |part: &Path| fs::remove_dir_all(part).is_ok() || part.symlink_metadata().is_err();
-        if goes(&self.new) && goes(&self.old) {
+        // The lock is removed last: without it no process sweeps a staging folder that is not empty.
+        if remove_folder(&self.new) && remove_folder(&self.old) {
             drop(fs::remove_dir_all(&self.root));
         }
     }
 }
 
-/// Makes a folder and its parents for what is done in it; those that this call made are gone again where it fails, and where they are
-/// not to stay.
+/// Makes a folder and its parents for what is done in it. Folders that this call made are removed again if `inside` fails, or
+/// unless they are to stay.
 ///
 /// # Errors
 /// The folder cannot be made; what fails in it.
@@ -320,23 +343,29 @@ pub(crate) fn in_folder<T, E: From<OutputError>>(
     stays: bool,
     inside: impl FnOnce() -> Result<T, E>,
 ) -> Result<T, E> {
-    let is_missing = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
-    let missing: Vec<&Path> = folder.ancestors().take_while(is_missing).collect();
-    let made = fs::create_dir_all(folder).map_err(|e| io_error("create folder", folder, e).into());
+    let missing = missing_ancestors(folder);
+    let made =
+        fs::create_dir_all(folder).map_err(|e| OutputError::io("create folder", folder, e).into());
     let done = made.and_then(|()| inside());
     if done.is_err() || !stays {
-        // Deepest first; `remove_dir` leaves a folder that somebody else has used meanwhile.
-        missing.into_iter().for_each(|f| drop(fs::remove_dir(f)));
+        // Deepest first; `remove_dir` leaves a folder that another program has used meanwhile.
+        for folder in missing {
+            drop(fs::remove_dir(folder));
+        }
     }
     done
 }
 
-fn io_error(action: &'static str, path: &Path, source: std::io::Error) -> OutputError {
-    OutputError::Io {
-        action,
-        path: path.to_owned(),
-        source,
+/// The folder and its parents that do not exist, the deepest first.
+fn missing_ancestors(folder: &Path) -> Vec<&Path> {
+    let mut missing = Vec::new();
+    for ancestor in folder.ancestors() {
+        if ancestor.as_os_str().is_empty() || ancestor.exists() {
+            break;
+        }
+        missing.push(ancestor);
     }
+    missing
 }
 
 #[cfg(test)]
@@ -445,13 +474,13 @@ mod tests {
     #[test]
     fn a_stage_that_is_going_keeps_its_lock_to_the_end_so_that_a_kill_then_leaves_what_is_swept() {
         let temp = tempfile::tempdir().unwrap();
-        let stage = Stage::make(temp.path()).unwrap();
-        let root = stage.root.clone();
-        let old = stage.old.clone();
+        let staging = StagingFolder::make(temp.path()).unwrap();
+        let root = staging.root.clone();
+        let old = staging.old.clone();
         fs::remove_dir(&old).unwrap();
         // What stops the removing, as a kill would.
         fs::write(&old, "").unwrap();
-        drop(stage);
+        drop(staging);
         assert_eq!(listing(&root), ["lock", "old"]);
         fs::remove_file(&old).unwrap();
         sweep_stages(temp.path());

@@ -5,7 +5,7 @@
 use super::error::OutputResult;
 use super::netcdf::{Data, Layout, described};
 use super::provenance::Provenance;
-use super::signals::RawSignals;
+use super::signals::{RawSignals, Recording};
 
 /// The file's bytes.
 ///
@@ -16,68 +16,96 @@ pub fn cf_signals_bytes(
     provenance: &Provenance,
 ) -> OutputResult<Vec<u8>> {
     signals.check()?;
-    let (rays, samples) = signals.current_a.dim();
-    // Which line, pulse and realisation each record belongs to.
-    let scan = signals.elevation_rad.len().max(1);
-    let line_of = |ray: usize| {
-        signals
-            .first_pulse
-            .partition_point(|first| *first <= ray % scan)
-            .saturating_sub(1)
-    };
-    let before = |ray: usize| signals.first_pulse.get(line_of(ray)).copied().unwrap_or(0);
-    let number = |of: &dyn Fn(usize) -> usize| {
-        Data::i32((0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX)))
-    };
-    let value = |of: &[f64]| Data::f64((0..rays).map(|ray| of[ray % scan]));
-    let elevation = signals
-        .first_pulse
-        .iter()
-        .filter_map(|first| signals.elevation_rad.get(*first));
-    let r = &signals.recording;
+    let (records, samples) = signals.current_a.dim();
+    let mut line_elevation_rad = Vec::new();
+    for first in &signals.first_pulse {
+        line_elevation_rad.extend(signals.elevation_rad.get(*first).copied());
+    }
+    let elevation_rad = repeated(&signals.elevation_rad, records);
+    let pulse_time_s = repeated(&signals.pulse_time_s, records);
     let mut values = vec![
         ("time", Data::f64(signals.time_s.iter().copied())),
-        ("ray", number(&|ray| ray)),
-        ("ray_line", number(&line_of)),
-        ("ray_pulse", number(&|ray| ray % scan - before(ray))),
-        ("realization", number(&|ray| ray / scan)),
-        ("elevation", value(&signals.elevation_rad)),
-        ("pulse_time", value(&signals.pulse_time_s)),
+        ("elevation", Data::f64(elevation_rad)),
+        ("pulse_time", Data::f64(pulse_time_s)),
         ("current_a", Data::f64(signals.current_a.iter().copied())),
-        ("sampling_frequency", Data::f64([r.sampling_hz])),
-        (
-            "intermediate_frequency",
-            Data::f64([r.intermediate_frequency_hz]),
-        ),
-        ("bandwidth", Data::f64([r.bandwidth_hz])),
-        ("wavelength", Data::f64([r.wavelength_m])),
-        (
-            "pulse_repetition_frequency",
-            Data::f64([r.pulse_repetition_hz]),
-        ),
-        ("pulse_sigma", Data::f64([r.pulse_sigma_s])),
-        ("noise_power", Data::f64([r.noise_power_a2])),
         ("range", Data::f64(signals.range_m.iter().copied())),
-        ("line_elevation", Data::f64(elevation.copied())),
+        ("line_elevation", Data::f64(line_elevation_rad)),
         ("radial_velocity", Data::filled(signals.radial_velocity_m_s)),
     ];
+    values.extend(record_numbers(signals, records));
+    values.extend(recording_values(&signals.recording));
     if !signals.azimuth_rad.is_empty() {
-        values.push(("azimuth", value(&signals.azimuth_rad)));
+        let azimuth_rad = repeated(&signals.azimuth_rad, records);
+        values.push(("azimuth", Data::f64(azimuth_rad)));
     }
-    values.extend(
-        signals
-            .quadrature_a
-            .map(|second| ("quadrature_a", Data::f64(second.iter().copied()))),
-    );
+    if let Some(second) = signals.quadrature_a {
+        values.push(("quadrature_a", Data::f64(second.iter().copied())));
+    }
     let (lines, ranges) = signals.radial_velocity_m_s.dim();
     let dims = vec![
-        ("ray", rays),
+        ("ray", records),
         ("time", samples),
         ("line", lines),
         ("range", ranges),
     ];
     let variables = described(include_str!("cf_signals.cdl"), values);
     Layout::cf("Raw heterodyne signals", dims, variables, provenance).into_bytes(provenance)
+}
+
+/// The line, the pulse of the line and the realisation of each record.
+fn record_numbers(signals: &RawSignals<'_>, records: usize) -> [(&'static str, Data); 4] {
+    let pulses = signals.elevation_rad.len().max(1);
+    let mut record_numbers = Vec::with_capacity(records);
+    let mut lines = Vec::with_capacity(records);
+    let mut pulses_of_lines = Vec::with_capacity(records);
+    let mut realisations = Vec::with_capacity(records);
+    for record in 0..records {
+        let pulse = record % pulses;
+        let begun = signals.first_pulse.partition_point(|first| *first <= pulse);
+        let line = begun.saturating_sub(1);
+        let first = signals.first_pulse.get(line).copied().unwrap_or(0);
+        record_numbers.push(stored_number(record));
+        lines.push(stored_number(line));
+        pulses_of_lines.push(stored_number(pulse - first));
+        realisations.push(stored_number(record / pulses));
+    }
+    [
+        ("ray", Data::i32(record_numbers)),
+        ("ray_line", Data::i32(lines)),
+        ("ray_pulse", Data::i32(pulses_of_lines)),
+        ("realization", Data::i32(realisations)),
+    ]
+}
+
+/// How the signals were recorded.
+fn recording_values(recording: &Recording) -> [(&'static str, Data); 7] {
+    [
+        ("sampling_frequency", recording.sampling_hz),
+        (
+            "intermediate_frequency",
+            recording.intermediate_frequency_hz,
+        ),
+        ("bandwidth", recording.bandwidth_hz),
+        ("wavelength", recording.wavelength_m),
+        ("pulse_repetition_frequency", recording.pulse_repetition_hz),
+        ("pulse_sigma", recording.pulse_sigma_s),
+        ("noise_power", recording.noise_power_a2),
+    ]
+    .map(|(name, value)| (name, Data::f64([value])))
+}
+
+/// A whole number as the format stores it; the largest one where it is larger.
+fn stored_number(number: usize) -> i32 {
+    i32::try_from(number).unwrap_or(i32::MAX)
+}
+
+/// Values of the pulses of one realisation for all records.
+fn repeated(values: &[f64], records: usize) -> Vec<f64> {
+    let mut all = Vec::with_capacity(records);
+    for record in 0..records {
+        all.push(values[record % values.len()]);
+    }
+    all
 }
 
 /// Bytes of data that the file has with so many pulses of so many samples, of one or two quadratures, and lines of so many

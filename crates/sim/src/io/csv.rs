@@ -28,6 +28,16 @@ impl Column {
         }
     }
 
+    /// A cell as JSON; null where it is missing.
+    #[cfg(feature = "cli")]
+    fn json(&self, row: usize) -> serde_json::Value {
+        match self {
+            Self::Float(v) => v[row].into(),
+            Self::Int(v) => v[row].into(),
+            Self::Text(v) => v[row].clone().into(),
+        }
+    }
+
     /// The text of a cell, floats in the form given.
     fn cell(&self, row: usize, float: fn(f64) -> String) -> String {
         match self {
@@ -101,28 +111,33 @@ impl Table {
     /// # Errors
     /// Tables whose columns differ in number, name or kind.
     pub fn stack(tables: impl IntoIterator<Item = Self>) -> OutputResult<Self> {
-        let refuse = |name: &str, other| {
-            OutputError::value(
-                "column of a table",
-                other,
-                format!("{name}, of the same kind"),
-            )
-        };
         let mut tables = tables.into_iter();
         let mut all = tables.next().unwrap_or_default();
         for table in tables {
-            let same = all.columns.len() == table.columns.len();
-            for ((name, column), (other, more)) in all.columns.iter_mut().zip(table.columns) {
-                let fits = same && *name == other;
-                match (column, more) {
-                    (Column::Float(column), Column::Float(more)) if fits => column.extend(more),
-                    (Column::Int(column), Column::Int(more)) if fits => column.extend(more),
-                    (Column::Text(column), Column::Text(more)) if fits => column.extend(more),
-                    _ => return Err(refuse(name, other)),
+            all.append(table)?;
+        }
+        Ok(all)
+    }
+
+    /// Adds the rows of a table with the same columns.
+    fn append(&mut self, table: Self) -> OutputResult<()> {
+        let has_same_count = self.columns.len() == table.columns.len();
+        for ((name, column), (other, more)) in self.columns.iter_mut().zip(table.columns) {
+            let is_same = has_same_count && *name == other;
+            match (column, more) {
+                (Column::Float(column), Column::Float(more)) if is_same => column.extend(more),
+                (Column::Int(column), Column::Int(more)) if is_same => column.extend(more),
+                (Column::Text(column), Column::Text(more)) if is_same => column.extend(more),
+                _ => {
+                    return Err(OutputError::value(
+                        "column of a table",
+                        other,
+                        format!("{name}, of the same kind"),
+                    ));
                 }
             }
         }
-        Ok(all)
+        Ok(())
     }
 
     /// Names and values in order.
@@ -130,22 +145,18 @@ impl Table {
         &self.columns
     }
 
-    /// The rows as objects, each with the names of the columns; what is missing is null.
+    /// The rows as objects with the names of the columns as keys; missing values are null.
     #[cfg(feature = "cli")]
     pub(crate) fn objects(&self) -> Vec<serde_json::Value> {
-        use serde_json::json;
-        let value = |column: &Column, row: usize| match column {
-            Column::Float(v) => json!(v[row]),
-            Column::Int(v) => json!(v[row]),
-            Column::Text(v) => json!(v[row]),
-        };
-        let object = |row| {
-            self.columns
-                .iter()
-                .map(|(name, column)| (name.clone(), value(column, row)))
-                .collect()
-        };
-        (0..self.len()).map(object).collect()
+        let mut objects = Vec::with_capacity(self.len());
+        for row in 0..self.len() {
+            let mut object = serde_json::Map::new();
+            for (name, column) in &self.columns {
+                object.insert(name.clone(), column.json(row));
+            }
+            objects.push(object.into());
+        }
+        objects
     }
 
     fn len(&self) -> usize {
@@ -154,27 +165,27 @@ impl Table {
 
     /// The table for people: columns side by side, floats as `digits` has them.
     pub fn aligned(&self) -> String {
-        let cell = |(name, column): &(String, Column), line: usize| match line.checked_sub(1) {
-            None => name.clone(),
-            Some(row) => column.cell(row, digits),
-        };
-        let lines = || 0..=self.len();
-        let width = |column| {
-            lines()
-                .map(|line| cell(column, line).chars().count())
-                .max()
-                .unwrap_or(0)
-        };
-        let widths: Vec<usize> = self.columns.iter().map(width).collect();
-        let padded = |line: usize| {
-            let cells = self
-                .columns
-                .iter()
-                .zip(&widths)
-                .map(|(column, width)| format!("{:>width$}", cell(column, line)));
-            cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
-        };
-        lines().map(padded).collect()
+        let mut lines = vec![String::new(); self.len() + 1];
+        for (index, (name, column)) in self.columns.iter().enumerate() {
+            let mut cells = vec![name.clone()];
+            for row in 0..self.len() {
+                cells.push(column.cell(row, digits));
+            }
+            let widths = cells.iter().map(|cell| cell.chars().count());
+            let width = widths.max().unwrap_or(0);
+            for (line, cell) in lines.iter_mut().zip(cells) {
+                if index > 0 {
+                    line.push_str("  ");
+                }
+                *line += &format!("{cell:>width$}");
+            }
+        }
+        let mut text = String::new();
+        for line in lines {
+            text += line.trim_end();
+            text.push('\n');
+        }
+        text
     }
 
     /// The table as CSV text.

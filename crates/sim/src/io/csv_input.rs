@@ -28,10 +28,7 @@ impl TextTable {
     /// A file that cannot be read; no header; rows with more or fewer cells than it.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = text_file::read(path).map_err(Error::io("read", path))?;
-        Self::parse(&text).map_err(|reason| Error::Input {
-            path: path.to_owned(),
-            reason,
-        })
+        Self::parse(&text).map_err(|reason| Error::input(path, reason))
     }
 
     /// Reads a text.
@@ -40,17 +37,13 @@ impl TextTable {
     /// As [`TextTable::read`], without the file.
     pub fn parse(text: &str) -> Result<Self, String> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        // A spreadsheet may say its separator in a line of its own.
+        // A spreadsheet may state its separator in a line of its own.
         let text = match text.split_once('\n') {
             Some((first, rest)) if first.starts_with("sep=") => rest,
             _ => text,
         };
-        let separator = Separator::of(text);
+        let separator = Separator::from_text(text);
         let mut records = records(text, separator).peekable();
-        let are_numbers = |cells: &Vec<String>| {
-            let number = |cell: &String| cell.trim().replace(',', ".").parse::<f64>();
-            cells.iter().all(|cell| number(cell).is_ok())
-        };
         let mut header = match records.peek() {
             Some(first) if are_numbers(first) => commented_header(text, separator, first.len())?,
             _ => records
@@ -72,44 +65,44 @@ impl TextTable {
             }
             rows.push(row);
         }
-        let comment = text
-            .lines()
-            .map_while(|line| line.strip_prefix('#'))
-            .map(|line| format!("{}\n", line.trim_end()));
+        let mut comment = String::new();
+        for line in text.lines().map_while(|line| line.strip_prefix('#')) {
+            comment += line.trim_end();
+            comment.push('\n');
+        }
         Ok(Self {
             header,
             rows,
-            comment: comment.collect(),
+            comment,
             has_decimal_commas: separator != Separator::Comma,
         })
     }
 
     /// Where the table comes from, as far as its comments say it.
     pub fn origin(&self) -> Provenance {
-        let entry = |name: &str| {
-            self.comment
-                .lines()
-                .find_map(|line| line.trim_start().strip_prefix(name))
-        };
         let (_, scene) = self.comment.split_once(" scene:\n").unwrap_or_default();
-        Provenance {
-            program: crate::PROGRAM.into(),
-            scene_toml: scene
-                .lines()
-                .map(|line| format!("{}\n", line.strip_prefix("   ").unwrap_or(line)))
-                .collect(),
-            scene_hash: entry("scene_hash: ").unwrap_or_default().into(),
-            seed: entry("seed: ")
-                .and_then(|seed| seed.parse().ok())
-                .unwrap_or(0),
+        let mut scene_toml = String::new();
+        for line in scene.lines() {
+            scene_toml += line.strip_prefix("   ").unwrap_or(line);
+            scene_toml.push('\n');
         }
+        let hash = self.comment_entry("scene_hash: ").unwrap_or_default();
+        let seed = self.comment_entry("seed: ").map(str::parse);
+        Provenance::new(&scene_toml, hash, seed.and_then(Result::ok).unwrap_or(0))
     }
 
-    /// Place of a column, in capital or small letters.
+    /// What follows a key in the comments.
+    fn comment_entry(&self, key: &str) -> Option<&str> {
+        let mut lines = self.comment.lines();
+        lines.find_map(|line| line.trim_start().strip_prefix(key))
+    }
+
+    /// Index of a column by its name, in capital or small letters.
     pub fn column(&self, name: &str) -> Option<usize> {
-        let is_same = |column: &String| column.eq_ignore_ascii_case(name);
-        let exact = self.header.iter().position(|column| column == name);
-        exact.or_else(|| self.header.iter().position(is_same))
+        let mut columns = self.header.iter();
+        let exact = columns.position(|column| column == name);
+        let mut columns = self.header.iter();
+        exact.or_else(|| columns.position(|column| column.eq_ignore_ascii_case(name)))
     }
 
     /// A cell as a number; NaN where it is empty or none.
@@ -125,6 +118,13 @@ impl TextTable {
     }
 }
 
+/// Whether all cells are numbers, with a decimal point or comma.
+fn are_numbers(cells: &[String]) -> bool {
+    cells
+        .iter()
+        .all(|cell| cell.trim().replace(',', ".").parse::<f64>().is_ok())
+}
+
 /// What is between the cells of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Separator {
@@ -137,9 +137,10 @@ enum Separator {
 
 impl Separator {
     /// That of the first line of cells, a header or numbers.
-    fn of(text: &str) -> Self {
-        let is_cells = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
-        let mut lines = text.lines().filter(is_cells);
+    fn from_text(text: &str) -> Self {
+        let mut lines = text
+            .lines()
+            .filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
         let first = lines.next().unwrap_or_default();
         let unquoted: String = first.split('"').step_by(2).collect();
         if unquoted.contains(';') {
@@ -151,7 +152,7 @@ impl Separator {
         // Names may hold blanks, which divide them only where the next line is as many numbers.
         let count = first.split_whitespace().count();
         let next: Vec<&str> = lines.next().unwrap_or(first).split_whitespace().collect();
-        let are_numbers = next.iter().all(|word| word.parse::<f64>().is_ok());
+        let are_numbers = next.iter().all(|cell| cell.parse::<f64>().is_ok());
         match count > 1 && next.len() == count && are_numbers {
             true => Self::Blanks,
             false => Self::Comma,

@@ -7,7 +7,14 @@ use wakescope_les::winds::{Edges, Side};
 
 /// The text of an axis' ends \[m, m/s\].
 pub(crate) fn to_text(edges: Edges) -> String {
-    let side = |side: Side| match side {
+    match edges {
+        Edges::Periodic { period_m } => format!("periodic {period_m:?}"),
+        Edges::Bounded { low, high } => format!("{}, {}", side_text(low), side_text(high)),
+    }
+}
+
+fn side_text(side: Side) -> String {
+    match side {
         Side::Open => "open".to_owned(),
         Side::SlipWall { position_m } => format!("slip_wall {position_m:?}"),
         Side::NoSlipWall {
@@ -16,10 +23,6 @@ pub(crate) fn to_text(edges: Edges) -> String {
         } => {
             format!("no_slip_wall {position_m:?} {u:?} {v:?} {w:?}")
         }
-    };
-    match edges {
-        Edges::Periodic { period_m } => format!("periodic {period_m:?}"),
-        Edges::Bounded { low, high } => format!("{}, {}", side(low), side(high)),
     }
 }
 

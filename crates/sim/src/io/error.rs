@@ -81,6 +81,14 @@ pub enum OutputError {
 pub type OutputResult<T> = Result<T, OutputError>;
 
 impl OutputError {
+    pub(crate) fn io(action: &'static str, path: &std::path::Path, source: std::io::Error) -> Self {
+        Self::Io {
+            action,
+            path: path.to_owned(),
+            source,
+        }
+    }
+
     pub(crate) fn unsupported(format: &'static str, reason: impl ToString) -> Self {
         Self::Unsupported {
             format,

@@ -43,11 +43,7 @@ impl Existing {
                     std::io::ErrorKind::IsADirectory,
                     "a folder of that name is in the way",
                 );
-                return Err(OutputError::Io {
-                    action: "write",
-                    path,
-                    source,
-                });
+                return Err(OutputError::io("write", &path, source));
             }
             if self == Self::Refuse {
                 return Err(OutputError::Exists { path });

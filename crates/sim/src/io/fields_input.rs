@@ -5,7 +5,7 @@
 
 use crate::Error;
 use crate::io::edges;
-use crate::io::netcdf_dimensions::{TIME, X, Y, Z};
+use crate::io::netcdf_dimensions::{Role, TIME, X, Y, Z};
 use crate::io::netcdf_input::{NetcdfFile, open};
 use crate::io::{UtcTime, variable};
 use std::path::{Path, PathBuf};
@@ -52,14 +52,16 @@ pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> 
 type FieldTimes = (Vec<(Option<usize>, f64)>, Option<UtcTime>);
 
 fn times(file: &NetcdfFile, name: &str) -> Result<FieldTimes, String> {
-    let date = |variable: &str| variable::reference(file, variable).map(|(date, _)| date);
     let Some(dim) = file.dim_of(name, TIME) else {
-        // A field on its own: its time is a number beside it.
-        let (time, reference) = match file.has("time") {
-            true => (file.seconds("time")?.first().copied(), date("time")),
-            false => (None, None),
-        };
-        return Ok((vec![(None, time.unwrap_or(0.0))], reference));
+        // A field without a time dimension: its time is a number beside it.
+        if !file.has("time") {
+            return Ok((vec![(None, 0.0)], None));
+        }
+        let time_s = file.seconds("time")?.first().copied();
+        return Ok((
+            vec![(None, time_s.unwrap_or(0.0))],
+            reference_date(file, "time"),
+        ));
     };
     if file.dims(name).and_then(|dims| dims.first().copied()) != Some(dim.as_str()) {
         return Err(format!("{name}: time must be its first dimension"));
@@ -67,14 +69,20 @@ fn times(file: &NetcdfFile, name: &str) -> Result<FieldTimes, String> {
     let source = file.coordinate_name(&dim);
     let source = source.or_else(|| file.has("time").then_some("time"));
     let (times_s, reference) = match source {
-        Some(source) => (file.seconds(source)?, date(source)),
+        Some(source) => (file.seconds(source)?, reference_date(file, source)),
         None => wrf_times(file)?,
     };
-    let times = times_s.into_iter().enumerate();
-    Ok((
-        times.map(|(i, time_s)| (Some(i), time_s)).collect(),
-        reference,
-    ))
+    let mut times = Vec::with_capacity(times_s.len());
+    for (index, time_s) in times_s.into_iter().enumerate() {
+        times.push((Some(index), time_s));
+    }
+    Ok((times, reference))
+}
+
+/// The date from which a variable counts its times.
+fn reference_date(file: &NetcdfFile, variable: &str) -> Option<UtcTime> {
+    let (date, _) = variable::reference(file, variable)?;
+    Some(date)
 }
 
 /// Times of WRF where they are texts alone: in s after the start of the run, or else after the first of them.
@@ -82,18 +90,21 @@ fn wrf_times(file: &NetcdfFile) -> Result<(Vec<f64>, Option<UtcTime>), String> {
     let texts = file.texts("Times").map_err(|_| {
         "it has no times: a variable of the name of its time dimension is needed".to_owned()
     })?;
-    let dates: Option<Vec<UtcTime>> = texts
-        .iter()
-        .map(|text| Some(UtcTime::parse_reference(text)?.0))
-        .collect();
-    let dates =
-        dates.ok_or("a text of its variable Times is no date such as 2024-01-31_12:00:00")?;
+    let mut dates = Vec::with_capacity(texts.len());
+    for text in &texts {
+        let (date, _) = UtcTime::parse_reference(text)
+            .ok_or("a text of its variable Times is no date such as 2024-01-31_12:00:00")?;
+        dates.push(date);
+    }
     let stated = ["SIMULATION_START_DATE", "START_DATE"]
         .iter()
         .find_map(|name| UtcTime::parse_reference(file.global_text(name)?));
     let start = stated.map(|(date, _)| date).or(dates.first().copied());
-    let after = |date: &UtcTime| start.map_or(0.0, |start| date.seconds_since(start));
-    Ok((dates.iter().map(after).collect(), start))
+    let mut times_s = Vec::with_capacity(dates.len());
+    for date in dates {
+        times_s.push(start.map_or(0.0, |start| date.seconds_since(start)));
+    }
+    Ok((times_s, start))
 }
 
 /// The components of one field, in m and m/s or the units that the file leaves unnamed, on the axes of the file.
@@ -102,23 +113,25 @@ fn wrf_times(file: &NetcdfFile) -> Result<(Vec<f64>, Option<UtcTime>), String> {
 /// A variable or a coordinate that is missing, a value that is missing, levels that are not level.
 pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<Components, Error> {
     let file = open(&field.path)?;
-    let component =
-        |name: &str| component(&file, name, field, true).map_err(|reason| file.refuse(reason));
-    let period_m = |role| match file
-        .text(&file.dim_of(&names[0], role)?, "edges")
-        .and_then(edges::from_text)
-    {
+    let mut components = Vec::with_capacity(names.len());
+    for name in names {
+        let component = component(&file, name, field, true);
+        components.push(component.map_err(|reason| file.refuse(reason))?);
+    }
+    let [u, v, w] = components
+        .try_into()
+        .map_err(|_| file.refuse("it has no three components".to_owned()))?;
+    let periods_m = [X, Y].map(|role| stated_period_m(&file, &names[0], role));
+    Ok(([u, v, w], periods_m))
+}
+
+/// The period along an axis of a variable, m, if the file states one.
+fn stated_period_m(file: &NetcdfFile, name: &str, role: Role) -> Option<f64> {
+    let text = file.text(&file.dim_of(name, role)?, "edges")?;
+    match edges::from_text(text) {
         Some(Edges::Periodic { period_m }) => Some(period_m),
         _ => None,
-    };
-    Ok((
-        [
-            component(&names[0])?,
-            component(&names[1])?,
-            component(&names[2])?,
-        ],
-        [X, Y].map(period_m),
-    ))
+    }
 }
 
 /// The components of a field, and the lengths of the periods along x and y that its file states for the first of them \[m\].
@@ -200,16 +213,7 @@ fn nodes(file: &NetcdfFile, dim: &str, place: Option<usize>) -> Result<Vec<f64>,
 
 /// Heights of WRF's levels above the ground, from the geopotential, if they are level.
 fn levels(file: &NetcdfFile, staggered: bool, place: Option<usize>) -> Result<Vec<f64>, String> {
-    let both = ["PH", "PHB"].map(|name| {
-        let dims = file
-            .roles(name, [TIME, Z, Y, X])
-            .map(|[_, z, y, x]| [z, y, x]);
-        dims.or_else(|_| file.roles(name, [Z, Y, X]))
-            .and_then(|dims| {
-                let count = file.length(&dims[0]).unwrap_or(0) as usize;
-                Ok((count, file.ordered(name, &dims, place)?))
-            })
-    });
+    let both = ["PH", "PHB"].map(|name| geopotential(file, name, place));
     let [(count, disturbed), (_, base)] =
         match both {
             [Ok(ph), Ok(phb)] if ph.1.len() == phb.1.len() && ph.0 > 1 => [ph, phb],
@@ -218,21 +222,20 @@ fn levels(file: &NetcdfFile, staggered: bool, place: Option<usize>) -> Result<Ve
                     .into(),
             ),
         };
-    let height_m: Vec<f64> = disturbed
-        .iter()
-        .zip(&base)
-        .map(|(a, b)| (a + b) / WRF_GRAVITY_M_S2)
-        .collect();
+    let mut height_m = Vec::with_capacity(base.len());
+    for (disturbed, base) in disturbed.iter().zip(&base) {
+        height_m.push((disturbed + base) / WRF_GRAVITY_M_S2);
+    }
     let columns = height_m.len() / count;
-    let mean_m: Vec<f64> = height_m
-        .chunks_exact(columns)
-        .map(|l| l.iter().sum::<f64>() / columns as f64)
-        .collect();
-    let uneven_m = height_m
-        .chunks_exact(columns)
-        .zip(&mean_m)
-        .flat_map(|(l, mean)| l.iter().map(move |h| (h - mean).abs()));
-    let uneven_m = uneven_m.fold(0.0, f64::max);
+    let mut mean_m = Vec::with_capacity(count);
+    let mut uneven_m = 0_f64;
+    for level_m in height_m.chunks_exact(columns) {
+        let mean = level_m.iter().sum::<f64>() / columns as f64;
+        for height_m in level_m {
+            uneven_m = uneven_m.max((height_m - mean).abs());
+        }
+        mean_m.push(mean);
+    }
     let ground_m = mean_m[0];
     let top_m = mean_m[count - 1];
     if uneven_m > LEVEL * (top_m - ground_m) {
@@ -241,14 +244,25 @@ fn levels(file: &NetcdfFile, staggered: bool, place: Option<usize>) -> Result<Ve
         ));
     }
     let faces_m: Vec<f64> = mean_m.iter().map(|h| h - ground_m).collect();
-    Ok(if staggered {
-        faces_m
-    } else {
-        faces_m
-            .windows(2)
-            .map(|pair| 0.5 * (pair[0] + pair[1]))
-            .collect()
-    })
+    if staggered {
+        return Ok(faces_m);
+    }
+    let pairs = faces_m.windows(2);
+    Ok(pairs.map(|pair| 0.5 * (pair[0] + pair[1])).collect())
+}
+
+/// Number of levels and values of a part of WRF's geopotential, level by level \[m^2/s^2\].
+fn geopotential(
+    file: &NetcdfFile,
+    name: &str,
+    place: Option<usize>,
+) -> Result<(usize, Vec<f64>), String> {
+    let dims = match file.roles(name, [TIME, Z, Y, X]) {
+        Ok([_, z, y, x]) => [z, y, x],
+        Err(_) => file.roles(name, [Z, Y, X])?,
+    };
+    let count = file.length(&dims[0]).unwrap_or(0) as usize;
+    Ok((count, file.ordered(name, &dims, place)?))
 }
 
 #[cfg(test)]

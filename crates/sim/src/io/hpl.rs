@@ -15,6 +15,9 @@ use ndarray::Array2;
 /// refuse every other remark.
 pub(super) const SYSTEM_ID: &str = "System ID:\t0";
 
+/// Name of the format in messages.
+const FORMAT: &str = "HALO .hpl";
+
 /// The bytes of the file called `file_name` (the header repeats it) with the rays of sweep `sweep`.
 ///
 /// Gate 0 of the format starts at the lidar, so gates before the first of the map are filled with no signal.
@@ -24,7 +27,9 @@ pub(super) const SYSTEM_ID: &str = "System ID:\t0";
 /// that overlap or leave gaps, or do not start a whole number of gates from the lidar (the format derives the range
 /// from the gate number); a sweep across midnight UTC.
 pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResult<Vec<u8>> {
-    let ((first, last), [velocity, snr_db]) = swept(map, sweep)?;
+    let (first, last) = sweep_rays(map, sweep)?;
+    let velocity = values(map, "radial_velocity")?;
+    let snr_db = values(map, "signal_to_noise_ratio")?;
     let (gate_m, before) = gate_grid(&map.range_m)?;
     within_a_day(map.rays[first].time_s, map.rays[last].time_s, map.start())?;
     let mut out = header(
@@ -56,53 +61,63 @@ pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResu
     Ok(out.into_bytes())
 }
 
-/// What the file of a sweep holds, as a table: `time_s, elevation_rad, range_m, v_mean_m_s, snr_db, ray`, a row for each
-/// velocity that is there; the ratio is minus infinity where the file has intensity 1.
+/// Content of the file of a sweep as a table: `time_s, elevation_rad, range_m, v_mean_m_s, snr_db, ray`, a row for each finite
+/// velocity; the ratio is minus infinity where the file has intensity 1.
 ///
 /// # Errors
 /// As [`hpl_bytes`].
 pub fn hpl_table(map: &VelocityMap, sweep: usize) -> OutputResult<Table> {
-    let ((first, last), [velocity, snr_db]) = swept(map, sweep)?;
-    let all = (first..=last).flat_map(|ray| (0..map.range_m.len()).map(move |gate| (ray, gate)));
-    let cells: Vec<(usize, usize)> = all.filter(|cell| velocity[*cell].is_finite()).collect();
-    let of_ray = |get: &dyn Fn(usize) -> f64| cells.iter().map(|c| get(c.0)).collect::<Vec<_>>();
-    let ratio = |cell: &(usize, usize)| {
-        if snr_db[*cell].is_nan() {
-            f64::NEG_INFINITY
-        } else {
-            snr_db[*cell]
+    let (first, last) = sweep_rays(map, sweep)?;
+    let velocity = values(map, "radial_velocity")?;
+    let snr_db = values(map, "signal_to_noise_ratio")?;
+    let mut time_s = Vec::new();
+    let mut elevation_rad = Vec::new();
+    let mut range_m = Vec::new();
+    let mut velocity_m_s = Vec::new();
+    let mut ratio_db = Vec::new();
+    let mut rays = Vec::new();
+    for ray in first..=last {
+        for (gate, gate_range_m) in map.range_m.iter().enumerate() {
+            if !velocity[[ray, gate]].is_finite() {
+                continue;
+            }
+            let snr_db = snr_db[[ray, gate]];
+            time_s.push(map.rays[ray].time_s);
+            elevation_rad.push(map.rays[ray].elevation_rad);
+            range_m.push(*gate_range_m);
+            velocity_m_s.push(velocity[[ray, gate]]);
+            ratio_db.push(if snr_db.is_nan() {
+                f64::NEG_INFINITY
+            } else {
+                snr_db
+            });
+            rays.push((ray - first) as i64);
         }
-    };
+    }
     Ok(Table::new()
-        .float("time_s", of_ray(&|ray| map.rays[ray].time_s))
-        .float("elevation_rad", of_ray(&|ray| map.rays[ray].elevation_rad))
-        .float("range_m", cells.iter().map(|c| map.range_m[c.1]))
-        .float("v_mean_m_s", cells.iter().map(|c| velocity[*c]))
-        .float("snr_db", cells.iter().map(ratio))
-        .int("ray", cells.iter().map(|c| (c.0 - first) as i64)))
+        .float("time_s", time_s)
+        .float("elevation_rad", elevation_rad)
+        .float("range_m", range_m)
+        .float("v_mean_m_s", velocity_m_s)
+        .float("snr_db", ratio_db)
+        .int("ray", rays))
 }
 
-/// First and last ray of a sweep, velocities and signal-to-noise ratios of all.
-type Swept<'m> = ((usize, usize), [&'m Array2<f64>; 2]);
-
-fn swept(map: &VelocityMap, sweep: usize) -> OutputResult<Swept<'_>> {
+/// First and last ray of a sweep of a valid map.
+fn sweep_rays(map: &VelocityMap, sweep: usize) -> OutputResult<(usize, usize)> {
     map.check()?;
     let bounds = map.sweep_bounds();
     let rays = bounds.get(sweep).copied();
-    let rays =
-        rays.ok_or_else(|| OutputError::value("sweep", sweep, format!("below {}", bounds.len())))?;
-    let need = |name: &str| {
-        map.field(name)
-            .map(|field| &field.values)
-            .ok_or_else(|| OutputError::Missing {
-                what: format!("field {name}"),
-                needed: "an .hpl file holds velocity and intensity".into(),
-            })
-    };
-    Ok((
-        rays,
-        [need("radial_velocity")?, need("signal_to_noise_ratio")?],
-    ))
+    rays.ok_or_else(|| OutputError::value("sweep", sweep, format!("below {}", bounds.len())))
+}
+
+/// Values of a field that the format needs.
+fn values<'m>(map: &'m VelocityMap, name: &str) -> OutputResult<&'m Array2<f64>> {
+    let field = map.field(name).ok_or_else(|| OutputError::Missing {
+        what: format!("field {name}"),
+        needed: "an .hpl file holds velocity and intensity".into(),
+    })?;
+    Ok(&field.values)
 }
 
 /// The format counts hours of one day.
@@ -125,9 +140,11 @@ pub fn within_a_day(first_s: f64, last_s: f64, start: super::UtcTime) -> OutputR
 
 /// Gate length in metres, and number of gates between the lidar and the first one.
 fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
-    let refuse = |reason: String| OutputError::unsupported("HALO .hpl", reason);
     if range_m.len() < 2 {
-        return Err(refuse("one gate does not tell the gate length".into()));
+        return Err(OutputError::unsupported(
+            FORMAT,
+            "a map of one gate has no gate length",
+        ));
     }
     let gate_m = (range_m[range_m.len() - 1] - range_m[0]) / (range_m.len() - 1) as f64;
     let before = (range_m[0] / gate_m - 0.5).round();
@@ -135,9 +152,13 @@ fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
         // Readers compute the centre as (gate + 0.5) * length; a millimetre is below what they keep.
         let expected = (before + i as f64 + 0.5) * gate_m;
         if before < 0.0 || (expected - r).abs() > 1e-3 {
-            return Err(refuse(format!(
-                "gate {i} is at {r} m; the format puts it at {expected} m: gates must touch, and start a whole number of gates from the lidar"
-            )));
+            return Err(OutputError::unsupported(
+                FORMAT,
+                format!(
+                    "gate {i} is at {r} m; the format puts it at {expected} m: gates must touch, and start a whole number of gates from \
+                     the lidar"
+                ),
+            ));
         }
     }
     Ok((gate_m, before as usize))

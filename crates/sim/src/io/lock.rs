@@ -27,18 +27,13 @@ impl FolderLock {
     /// [`OutputError::InUse`] while another run has it; what the system says.
     pub(crate) fn take(folder: &Path) -> OutputResult<Self> {
         let path = folder.join(NAME);
-        let io = |source| OutputError::Io {
-            action: "lock",
-            path: path.clone(),
-            source,
-        };
         let file = loop {
-            let file = OpenOptions::new()
+            let opened = OpenOptions::new()
                 .create(true)
                 .truncate(false)
                 .write(true)
-                .open(&path)
-                .map_err(io)?;
+                .open(&path);
+            let file = opened.map_err(|error| OutputError::io("lock", &path, error))?;
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
@@ -52,12 +47,14 @@ impl FolderLock {
                 {
                     break file;
                 }
-                Err(TryLockError::Error(error)) => return Err(io(error)),
+                Err(TryLockError::Error(error)) => {
+                    return Err(OutputError::io("lock", &path, error));
+                }
             }
             if is_at(&file, &path) {
                 break file;
             }
-            // The one before took its file away between our opening and our locking.
+            // The holder before removed the file after it was opened here and before it was locked.
         };
         sweep_stages(folder);
         Ok(Self { path, _file: file })
@@ -76,10 +73,16 @@ impl Drop for FolderLock {
 /// Whether the open file is still the one of that name.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> bool {
+    let open = file_id(file.metadata());
+    open.is_some() && open == file_id(path.metadata())
+}
+
+/// Device and number of a file.
+#[cfg(unix)]
+fn file_id(metadata: std::io::Result<std::fs::Metadata>) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt as _;
-    let id = |m: std::fs::Metadata| (m.dev(), m.ino());
-    let [open, named] = [file.metadata(), path.metadata()].map(|m| m.ok().map(id));
-    open.is_some() && open == named
+    let metadata = metadata.ok()?;
+    Some((metadata.dev(), metadata.ino()))
 }
 
 /// Elsewhere the file is never taken away.

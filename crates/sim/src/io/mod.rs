@@ -73,4 +73,5 @@ pub(crate) use utc::MAX_TIME_S;
 pub use utc::UtcTime;
 
 #[cfg(test)]
+#[path = "samples_for_tests.rs"]
 pub(crate) mod samples;

@@ -248,13 +248,12 @@ impl Layout {
 
     /// Values of a whole variable.
     fn count(&self, variable: &Variable) -> usize {
-        let size = |dim: &&str| {
-            self.dims
-                .iter()
-                .find(|(name, _)| name == dim)
-                .map_or(0, |(_, size)| *size)
-        };
-        variable.dims.iter().map(size).product()
+        let mut count = 1;
+        for dim in &variable.dims {
+            let length = self.dims.iter().find(|(name, _)| name == dim);
+            count *= length.map_or(0, |(_, length)| *length);
+        }
+        count
     }
 
     /// Checks the lengths, and that readers can take names for such and tell them apart.

@@ -19,14 +19,13 @@ const MOST_GROUPS: usize = 10_000;
 /// # Errors
 /// What is wrong with it; a damaged file.
 pub(super) fn check_groups(path: &Path, unsound: &'static str) -> Result<Packing, &'static str> {
-    let damaged = |_: hdf5_reader::error::Error| unsound;
     let mut packing = Packing::new();
     let root = Hdf5File::open(path).and_then(|file| file.root_group());
-    let mut groups = vec![(String::new(), root.map_err(damaged)?)];
+    let mut groups = vec![(String::new(), root.map_err(|_| unsound)?)];
     for _ in 0..=DEEPEST {
         let mut below = Vec::new();
         for (path, group) in &groups {
-            let (children, datasets) = group.members().map_err(damaged)?;
+            let (children, datasets) = group.members().map_err(|_| unsound)?;
             for dataset in datasets {
                 let mut names: Vec<String> =
                     dataset.attributes().into_iter().map(|a| a.name).collect();
@@ -50,12 +49,14 @@ pub(super) fn check_groups(path: &Path, unsound: &'static str) -> Result<Packing
 
 /// The codes of a variable whose values have names, such as flags and booleans.
 pub(super) fn codes(file: &NcFile, path: &str) -> Option<Vec<f64>> {
-    let values = file.read_variable_user_defined(path).ok()?;
-    let code = |value: &NcValue| match value {
-        NcValue::Enum(named) => Some(named.value.as_i128()? as f64),
-        _ => None,
-    };
-    values.iter().map(code).collect()
+    let mut codes = Vec::new();
+    for value in file.read_variable_user_defined(path).ok()? {
+        let NcValue::Enum(named) = value else {
+            return None;
+        };
+        codes.push(named.value.as_i128()? as f64);
+    }
+    Some(codes)
 }
 
 /// The last name of a path.

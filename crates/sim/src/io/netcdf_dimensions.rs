@@ -7,7 +7,6 @@
 use super::netcdf_input::{NetcdfFile, own_name, presentable};
 use super::units::Quantity;
 use ndarray::{ArrayD, Axis};
-use netcdf_reader::NcVariable;
 
 /// What a dimension is for: its name here, its letter in the attribute `axis`, and other names for it.
 #[derive(Debug, Clone, Copy)]
@@ -51,38 +50,44 @@ pub(crate) const Z: Role = Role {
 };
 
 impl NetcdfFile {
-    /// The dimension of `variable` that has a role.
+    /// The dimension of `variable` that has a role: by its name, by the attribute `axis` of its coordinate, or by the name of that.
     fn find(&self, dims: &[&str], role: Role) -> Option<usize> {
-        let of_axis = |dim: &&str| {
-            let own = self.coordinate_name(dim);
-            own.and_then(|name| self.text(name, "axis"))
-                .is_some_and(|axis| axis.eq_ignore_ascii_case(role.axis))
-        };
-        let of_coordinate = |dim: &&str| {
+        let by_name = dims.iter().position(|dim| role.is_named(dim));
+        if by_name.is_some() {
+            return by_name;
+        }
+        let by_axis = dims.iter().position(|dim| self.has_axis(dim, role.axis));
+        if by_axis.is_some() {
+            return by_axis;
+        }
+        dims.iter().position(|dim| {
             self.coordinate_name(dim)
                 .is_some_and(|name| role.is_named(name))
-        };
-        dims.iter()
-            .position(|dim| role.is_named(dim))
-            .or_else(|| dims.iter().position(of_axis))
-            .or_else(|| dims.iter().position(of_coordinate))
+        })
+    }
+
+    /// Whether the coordinate of a dimension has this attribute `axis`.
+    fn has_axis(&self, dim: &str, axis: &str) -> bool {
+        self.coordinate_name(dim)
+            .and_then(|name| self.text(name, "axis"))
+            .is_some_and(|own| own.eq_ignore_ascii_case(axis))
     }
 
     /// The variable with the positions of a dimension: that of its name, or one along it alone that is called as one or has the
     /// attribute `axis`.
     pub(crate) fn coordinate_name(&self, dim: &str) -> Option<&str> {
-        let runs_along =
-            |variable: &&NcVariable| matches!(&variable.dimensions[..], [only] if only.name == dim);
-        let is_called = |variable: &&NcVariable| {
-            let name = own_name(variable);
-            [TIME, X, Y, Z].iter().any(|role| role.is_named(name))
-                || self.text(name, "axis").is_some()
-        };
         if self.has(dim) {
             return self.variable(dim).map(own_name);
         }
-        let mut along = self.variables.iter().filter(runs_along);
-        along.find(is_called).map(own_name)
+        for variable in &self.variables {
+            let is_along = matches!(&variable.dimensions[..], [only] if only.name == dim);
+            let name = own_name(variable);
+            let is_called = [TIME, X, Y, Z].iter().any(|role| role.is_named(name));
+            if is_along && (is_called || self.text(name, "axis").is_some()) {
+                return Some(name);
+            }
+        }
+        None
     }
 
     /// The dimension of a variable that has a role, if there is one.
@@ -268,8 +273,14 @@ impl NetcdfFile {
             .map(|dim| self.length(dim).unwrap_or(1) as usize)
             .collect();
         // What is left over has one place.
-        let (mut axes, spare): (Vec<usize>, Vec<usize>) =
-            (0..dims.len()).partition(|at| order.iter().any(|own| own == dims[*at]));
+        let mut axes = Vec::new();
+        let mut spare = Vec::new();
+        for (axis, dim) in dims.iter().enumerate() {
+            match order.iter().any(|own| own == dim) {
+                true => axes.push(axis),
+                false => spare.push(axis),
+            }
+        }
         axes.sort_by_key(|at| order.iter().position(|own| own == dims[*at]));
         axes.extend(spare);
         let mut stored = ArrayD::from_shape_vec(lengths, values)

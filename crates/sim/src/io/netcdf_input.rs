@@ -11,8 +11,7 @@ use ndarray::ArrayD;
 use netcdf_reader::masked::MaskParams;
 use netcdf_reader::unpack::{SignParams, UnpackParams};
 use netcdf_reader::{
-    NcAttrValue, NcAttribute, NcFile, NcFormat, NcGroup, NcSliceInfo, NcSliceInfoElem, NcType,
-    NcVariable,
+    NcAttrValue, NcAttribute, NcFile, NcFormat, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable,
 };
 #[cfg(feature = "netcdf4")]
 use netcdf_reader::{NcMetadataMode, NcOpenOptions};
@@ -68,57 +67,14 @@ impl std::fmt::Debug for NetcdfFile {
 /// # Errors
 /// What the system says; a file of another kind, or one whose header does not fit its length.
 pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
-    let refuse = |reason: &str| Error::Input {
-        path: path.to_owned(),
-        reason: reason.to_owned(),
-    };
     let (_, bytes, beginning) = text_file::begin(path)?;
-    let packing = match &beginning[..] {
-        [b'C', b'D', b'F', 1 | 2 | 5, ..] => Packing::default(),
-        #[cfg(feature = "netcdf4")]
-        [0x89, b'H', b'D', b'F', ..] => {
-            super::netcdf4_input::check_groups(path, UNSOUND_HDF5).map_err(refuse)?
-        }
-        #[cfg(not(feature = "netcdf4"))]
-        [0x89, b'H', b'D', b'F', ..] => {
-            return Err(refuse(&format!(
-                "it is NetCDF-4 (HDF5), classic NetCDF is needed: {CONVERT}"
-            )));
-        }
-        _ => return Err(refuse(OTHER)),
-    };
-    let unsound = || {
-        refuse(if beginning[0] == b'C' {
-            UNSOUND
-        } else {
-            UNSOUND_HDF5
-        })
-    };
-    // By places: a file that is mapped to memory would end the program where it becomes shorter. Variables and attributes of types
-    // that netCDF does not know are passed over, as nothing may need them.
-    #[cfg(feature = "netcdf4")]
-    let file = hdf5_reader::FileStorage::open(path).ok().and_then(|file| {
-        let options = NcOpenOptions {
-            metadata_mode: NcMetadataMode::Lossy,
-            ..NcOpenOptions::default()
-        };
-        NcFile::from_storage_with_options(Arc::new(file), options).ok()
-    });
-    #[cfg(not(feature = "netcdf4"))]
-    let file = NcFile::open(path).ok();
-    let file = file.ok_or_else(unsound)?;
-    let root = file.root_group().map_err(|_| unsound())?;
-    // The library holds only records against the length of the file.
-    let end_of = |v: &NcVariable| {
-        v.data_offset.checked_add(
-            v.num_elements()
-                .ok()?
-                .checked_mul(v.dtype.size().ok()? as u64)?,
-        )
-    };
-    let is_cut = |v: &NcVariable| !v.is_record_var && end_of(v).is_none_or(|end| end > bytes);
-    if beginning[0] == b'C' && root.variables.iter().any(is_cut) {
-        return Err(unsound());
+    let packing = packing(path, &beginning).map_err(|reason| Error::input(path, reason))?;
+    let is_classic = beginning[0] == b'C';
+    let unsound = if is_classic { UNSOUND } else { UNSOUND_HDF5 };
+    let file = open_library(path).ok_or_else(|| Error::input(path, unsound))?;
+    let root = file.root_group().map_err(|_| Error::input(path, unsound))?;
+    if is_classic && root.variables.iter().any(|v| is_cut(v, bytes)) {
+        return Err(Error::input(path, unsound));
     }
     let variables = root.variables.clone();
     let attributes = root.attributes.clone();
@@ -132,6 +88,57 @@ pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
         attributes,
         packing: Arc::new(packing),
     })
+}
+
+/// The attributes about packing of a file that begins so, none of a classic one.
+///
+/// # Errors
+/// A file of another kind; groups that cannot be read.
+#[cfg_attr(not(feature = "netcdf4"), expect(unused_variables))]
+fn packing(path: &Path, beginning: &[u8]) -> Result<Packing, String> {
+    match beginning {
+        [b'C', b'D', b'F', 1 | 2 | 5, ..] => Ok(Packing::default()),
+        #[cfg(feature = "netcdf4")]
+        [0x89, b'H', b'D', b'F', ..] => {
+            super::netcdf4_input::check_groups(path, UNSOUND_HDF5).map_err(str::to_owned)
+        }
+        #[cfg(not(feature = "netcdf4"))]
+        [0x89, b'H', b'D', b'F', ..] => Err(format!(
+            "it is NetCDF-4 (HDF5), classic NetCDF is needed: {CONVERT}"
+        )),
+        _ => Err(OTHER.to_owned()),
+    }
+}
+
+/// Opens a file with the library of NetCDF; none where it cannot read it.
+#[cfg(feature = "netcdf4")]
+fn open_library(path: &Path) -> Option<NcFile> {
+    // By places: a file that is mapped to memory would end the program where it becomes shorter. Variables and attributes of types
+    // that netCDF does not know are passed over, as nothing may need them.
+    let file = hdf5_reader::FileStorage::open(path).ok()?;
+    let options = NcOpenOptions {
+        metadata_mode: NcMetadataMode::Lossy,
+        ..NcOpenOptions::default()
+    };
+    NcFile::from_storage_with_options(Arc::new(file), options).ok()
+}
+
+/// Opens a file with the library of NetCDF; none where it cannot read it.
+#[cfg(not(feature = "netcdf4"))]
+fn open_library(path: &Path) -> Option<NcFile> {
+    NcFile::open(path).ok()
+}
+
+/// Whether a variable of a classic file reaches beyond its end: the library compares only records with the length of the file.
+fn is_cut(variable: &NcVariable, file_bytes: u64) -> bool {
+    !variable.is_record_var && end_byte(variable).is_none_or(|end| end > file_bytes)
+}
+
+/// Where the data of a variable end; none where the header counts more than a file can have.
+fn end_byte(variable: &NcVariable) -> Option<u64> {
+    let count = variable.num_elements().ok()?;
+    let size = variable.dtype.size().ok()? as u64;
+    variable.data_offset.checked_add(count.checked_mul(size)?)
 }
 
 /// Opens the root of a file and the groups in it, as far as they have what is `needed`; attributes of the file are those of its
@@ -149,17 +156,14 @@ pub(crate) fn open_groups(
         .file
         .root_group()
         .map_or(&[][..], |group| &group.groups);
-    let of_group = |group: &NcGroup| {
-        let (group, variables) = (group.name.clone(), group.variables.clone());
-        NetcdfFile {
-            group,
-            variables,
+    let mut found = vec![root.clone()];
+    for group in groups {
+        found.push(NetcdfFile {
+            group: group.name.clone(),
+            variables: group.variables.clone(),
             ..root.clone()
-        }
-    };
-    let mut found: Vec<NetcdfFile> = std::iter::once(root.clone())
-        .chain(groups.iter().map(of_group))
-        .collect();
+        });
+    }
     found.retain(has_needed);
     if found.is_empty() {
         return Err(root.refuse(format!(
@@ -177,10 +181,7 @@ impl NetcdfFile {
         } else {
             format!("group {}: {reason}", self.group)
         };
-        Error::Input {
-            path: self.path.clone(),
-            reason,
-        }
+        Error::input(&self.path, reason)
     }
 
     pub(super) fn variable(&self, name: &str) -> Option<&NcVariable> {
@@ -249,23 +250,21 @@ impl NetcdfFile {
     /// # Errors
     /// A variable that is not there or not made of texts.
     pub(crate) fn texts(&self, name: &str) -> Result<Vec<String>, String> {
-        let is_text = |v: &&NcVariable| matches!(v.dtype, NcType::Char | NcType::String);
-        let own = self.variable(name).filter(is_text);
-        let of_root = || {
-            self.root
-                .iter()
-                .find(|v| own_name(v) == name)
-                .filter(is_text)
-        };
-        let path = match (own, of_root()) {
+        let own = self.variable(name).filter(|v| is_text(v));
+        let of_root = self.root.iter().find(|v| own_name(v) == name);
+        let path = match (own, of_root.filter(|v| is_text(v))) {
             (Some(variable), _) => self.path_of(variable),
             (None, Some(variable)) => variable.name.clone(),
             (None, None) => return Err(format!("it has no texts {name}")),
         };
-        let texts = self.file.read_variable_as_strings(&path);
-        let texts = texts.map_err(|_| format!("variable {name} cannot be read"))?;
-        let plain = |text: String| text.trim_matches(['\0', ' ']).to_owned();
-        Ok(texts.into_iter().map(plain).collect())
+        let mut texts = self
+            .file
+            .read_variable_as_strings(&path)
+            .map_err(|_| format!("variable {name} cannot be read"))?;
+        for text in &mut texts {
+            *text = text.trim_matches(['\0', ' ']).to_owned();
+        }
+        Ok(texts)
     }
 
     /// A text of the file: a variable of one text in the group or the root, or an attribute of the file.
@@ -412,8 +411,9 @@ impl NetcdfFile {
         let units = self.text(name, "units").unwrap_or_default();
         let (text, _) = split_date(units);
         let shown = presentable(name).unwrap_or("a variable");
-        let refused = |needed| format!("{shown} has units = {}: {needed}", quoted(units));
-        quantity.si(text).map_err(refused)
+        quantity
+            .si(text)
+            .map_err(|needed| format!("{shown} has units = {}: {needed}", quoted(units)))
     }
 }
 
@@ -435,19 +435,15 @@ fn unpacked(variable: &NcVariable, mut values: ArrayD<f64>) -> ArrayD<f64> {
     let packing = UnpackParams::from_variable(variable);
     // Limits in the type of the packed numbers are about these, others about what they stand for (NetCDF User's Guide, A.1).
     let is_packed = packing.is_some() && !is_float(&variable.dtype);
-    let is_of_values = |attribute: &NcAttribute| {
-        let is_float = matches!(
-            attribute.value,
-            NcAttrValue::Floats(_) | NcAttrValue::Doubles(_)
-        );
-        is_packed && is_float && attribute.name.starts_with("valid_")
-    };
-    let (of_values, of_stored) = variable.attributes.iter().cloned().partition(is_of_values);
-    let with = |attributes| NcVariable {
-        attributes,
-        ..variable.clone()
-    };
-    let mask = MaskParams::from_variable(&with(of_stored));
+    let mut of_stored = variable.clone();
+    let mut of_values = variable.clone();
+    of_stored
+        .attributes
+        .retain(|attribute| !(is_packed && is_float_limit(attribute)));
+    of_values
+        .attributes
+        .retain(|attribute| is_packed && is_float_limit(attribute));
+    let mask = MaskParams::from_variable(&of_stored);
     let is_filled = mask
         .as_ref()
         .is_some_and(|mask| mask.fill_value.is_some() || !mask.missing_values.is_empty());
@@ -456,8 +452,10 @@ fn unpacked(variable: &NcVariable, mut values: ArrayD<f64>) -> ArrayD<f64> {
         values.mapv_inplace(|value| if value == unwritten { f64::NAN } else { value });
     }
     if is_float(&variable.dtype) {
-        let is_unwritten = |value: f64| (value / DEFAULT_FILL - 1.0).abs() < 1e-6;
-        values.mapv_inplace(|value| if is_unwritten(value) { f64::NAN } else { value });
+        values.mapv_inplace(|value| match (value / DEFAULT_FILL - 1.0).abs() < 1e-6 {
+            true => f64::NAN,
+            false => value,
+        });
     }
     if let Some(sign) = sign {
         sign.apply(&mut values);
@@ -468,10 +466,23 @@ fn unpacked(variable: &NcVariable, mut values: ArrayD<f64>) -> ArrayD<f64> {
     if let Some(packing) = packing {
         packing.apply(&mut values);
     }
-    if let Some(limits) = MaskParams::from_variable(&with(of_values)) {
+    if let Some(limits) = MaskParams::from_variable(&of_values) {
         limits.apply(&mut values);
     }
     values
+}
+
+/// Whether an attribute is a limit of valid values and a float.
+fn is_float_limit(attribute: &NcAttribute) -> bool {
+    let is_float = matches!(
+        attribute.value,
+        NcAttrValue::Floats(_) | NcAttrValue::Doubles(_)
+    );
+    is_float && attribute.name.starts_with("valid_")
+}
+
+fn is_text(variable: &NcVariable) -> bool {
+    matches!(variable.dtype, NcType::Char | NcType::String)
 }
 
 fn is_float(kind: &NcType) -> bool {

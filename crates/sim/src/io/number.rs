@@ -75,11 +75,14 @@ impl NumberType {
 
     /// A number from its bytes in this order.
     pub(crate) fn value(self, bytes: &[u8], order: ByteOrder) -> f64 {
-        let join = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
-        let bits = match order {
-            ByteOrder::Big => bytes.iter().fold(0, join),
-            ByteOrder::Little => bytes.iter().rev().fold(0, join),
-        };
+        let mut bits = 0_u64;
+        for i in 0..bytes.len() {
+            let byte = match order {
+                ByteOrder::Big => bytes[i],
+                ByteOrder::Little => bytes[bytes.len() - 1 - i],
+            };
+            bits = bits << 8 | u64::from(byte);
+        }
         let unused = 64 - 8 * self.bytes;
         match self.kind {
             // The sign is the highest of its own bits.

@@ -25,38 +25,39 @@ pub(crate) fn files(planes: &Path) -> Result<Vec<PathBuf>, Error> {
         .parent()
         .filter(|f| !f.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
-    let stem = planes
-        .file_name()
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default();
-    let numbered = |path: &PathBuf| {
-        let name = path
-            .file_name()
-            .map(|n| n.to_string_lossy().into_owned())
-            .unwrap_or_default();
-        let number = name
-            .strip_prefix(&format!("{stem}_"))
-            .and_then(|rest| rest.strip_suffix(".nc"));
-        number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
-    };
-    let listed =
-        std::fs::read_dir(folder).map(|entries| entries.filter_map(|e| Some(e.ok()?.path())));
-    let mut found: Vec<PathBuf> = listed
-        .map(|paths| paths.filter(numbered).collect())
-        .unwrap_or_default();
+    let stem = file_name(planes);
+    let mut found = Vec::new();
+    if let Ok(entries) = std::fs::read_dir(folder) {
+        for entry in entries.flatten() {
+            let path = entry.path();
+            if is_numbered(&file_name(&path), &stem) {
+                found.push(path);
+            }
+        }
+    }
     // Longer numbers behind shorter ones.
     found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
     if found.is_empty() {
-        let reason = format!(
-            "neither a file nor the beginning of files {stem}_0001.nc, ... in {}",
-            folder.display()
-        );
-        return Err(Error::Input {
-            path: planes.to_owned(),
-            reason,
-        });
+        let folder = folder.display();
+        return Err(Error::input(
+            planes,
+            format!("neither a file nor the beginning of files {stem}_0001.nc, ... in {folder}"),
+        ));
     }
     Ok(found)
+}
+
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// Whether a file name is the stem with a number, such as `planes_0001.nc`.
+fn is_numbered(name: &str, stem: &str) -> bool {
+    let number = name
+        .strip_prefix(&format!("{stem}_"))
+        .and_then(|rest| rest.strip_suffix(".nc"));
+    number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Reads one file.
@@ -77,18 +78,12 @@ fn planes(file: &NetcdfFile) -> Result<CrossPlanes, String> {
     let [time, z, y] = &dims;
     let z_m = file.coordinate_m(z)?;
     let y_m = file.coordinate_m(y)?;
-    let [tau, time_s] = times(file, time)?;
+    let count = file.coordinate(time)?.len();
+    let tau = ages(file, time, count)?;
+    let time_s = times_s(file, time, count)?;
     let shape = (tau.len(), z_m.len(), y_m.len());
-    let component = |name: &str| -> Result<Array3<f64>, String> {
-        let values = file.velocities(name, &dims, None)?;
-        if let Some(place) = values.iter().position(|v| !v.is_finite()) {
-            return Err(format!("{name} is missing or not finite at place {place}"));
-        }
-        Array3::from_shape_vec(shape, values)
-            .map_err(|_| format!("{name} has not the lengths of its coordinates"))
-    };
-    let v_m_s = component("v")?;
-    let w_m_s = component("w")?;
+    let v_m_s = component(file, "v", &dims, shape)?;
+    let w_m_s = component(file, "w", &dims, shape)?;
     let y_edges = ends(file, y)?;
     let z_edges = ends(file, z)?;
     let planes = CrossPlanes {
@@ -106,27 +101,50 @@ fn planes(file: &NetcdfFile) -> Result<CrossPlanes, String> {
     Ok(planes)
 }
 
-/// Ages and times \[s\] of the planes: each from the variable of its name, or else from the coordinate of the planes.
-fn times(file: &NetcdfFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
-    let count = file.coordinate(dim)?.len();
-    let is_age = ["tau", "age"].contains(&dim.to_ascii_lowercase().as_str());
-    let values = |name: &str| -> Result<Vec<f64>, String> {
-        if name == "time" && is_age && !file.has(name) {
-            return Err("it has no variable time, the times of the planes in s".into());
-        }
-        let source = if file.has(name) { name } else { dim };
-        let values = if name == "time" || !is_age {
-            file.seconds(source)?
-        } else {
-            file.floats(source)?
-        };
-        if values.len() == count {
-            Ok(values)
-        } else {
-            Err(format!("{name} has not one value for each plane"))
-        }
+/// A component of the wind in all planes, m/s.
+fn component(
+    file: &NetcdfFile,
+    name: &str,
+    dims: &[String; 3],
+    shape: (usize, usize, usize),
+) -> Result<Array3<f64>, String> {
+    let values = file.velocities(name, dims, None)?;
+    if let Some(index) = values.iter().position(|v| !v.is_finite()) {
+        return Err(format!("{name} is missing or not finite at place {index}"));
+    }
+    Array3::from_shape_vec(shape, values)
+        .map_err(|_| format!("{name} has not the lengths of its coordinates"))
+}
+
+/// Whether the planes lie along their ages.
+fn is_age(dim: &str) -> bool {
+    ["tau", "age"].contains(&dim.to_ascii_lowercase().as_str())
+}
+
+/// Ages of the planes: the variable `tau`, or else the coordinate of the planes, which may be their times \[s\].
+fn ages(file: &NetcdfFile, dim: &str, count: usize) -> Result<Vec<f64>, String> {
+    let source = if file.has("tau") { "tau" } else { dim };
+    let ages = match is_age(dim) {
+        true => file.floats(source)?,
+        false => file.seconds(source)?,
     };
-    Ok([values("tau")?, values("time")?])
+    one_for_each("tau", ages, count)
+}
+
+/// Times of the planes, s: the variable `time`, or else the coordinate of the planes.
+fn times_s(file: &NetcdfFile, dim: &str, count: usize) -> Result<Vec<f64>, String> {
+    if is_age(dim) && !file.has("time") {
+        return Err("it has no variable time, the times of the planes in s".into());
+    }
+    let source = if file.has("time") { "time" } else { dim };
+    one_for_each("time", file.seconds(source)?, count)
+}
+
+fn one_for_each(name: &str, values: Vec<f64>, count: usize) -> Result<Vec<f64>, String> {
+    match values.len() == count {
+        true => Ok(values),
+        false => Err(format!("{name} has not one value for each plane")),
+    }
 }
 
 /// The ends of an axis; open if the file does not say.

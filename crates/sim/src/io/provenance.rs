@@ -49,17 +49,18 @@ impl Provenance {
     /// The entries as comment lines `# key: value` that end with a line feed; the scene follows its key line by line, indented.
     pub fn comment_lines(&self) -> String {
         let [source, seed, hash, (_, scene)] = self.entries();
-        let entry =
-            |(key, text): (&str, String)| format!("# {key}: {}\n", text.replace(['\n', '\r'], " "));
+        let mut text = String::new();
         // A comment must stay one line for every reader of the table.
-        let line = |line: &str| {
-            format!("#   {}", line.replace('\r', " "))
-                .trim_end()
-                .to_owned()
-                + "\n"
-        };
-        let entries: String = [source, seed, hash].map(entry).concat();
-        entries + "# scene:\n" + &scene.lines().map(line).collect::<String>()
+        for (key, value) in [source, seed, hash] {
+            text += &format!("# {key}: {}\n", value.replace(['\n', '\r'], " "));
+        }
+        text += "# scene:\n";
+        for line in scene.lines() {
+            let comment = format!("#   {}", line.replace('\r', " "));
+            text += comment.trim_end();
+            text.push('\n');
+        }
+        text
     }
 }
 

@@ -9,6 +9,7 @@ use super::csv_input::TextTable;
 use super::text_file;
 use crate::Error;
 use crate::beams::{Stop, SweepMode};
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 /// Most rows that are read.
@@ -24,10 +25,7 @@ const COLUMNS: &str = "time_s, azimuth_rad, azimuth_deg, elevation_rad, elevatio
 /// A file that cannot be read; an empty list; the first row that does not fit, with column, value and what is allowed.
 pub fn read(path: &Path) -> Result<Vec<Stop>, Error> {
     let text = text_file::read(path).map_err(Error::io("read", path))?;
-    parse(&text).map_err(|reason| Error::Input {
-        path: path.to_owned(),
-        reason,
-    })
+    parse(&text).map_err(|reason| Error::input(path, reason))
 }
 
 /// Reads the text of a list.
@@ -39,165 +37,227 @@ pub fn parse(text: &str) -> Result<Vec<Stop>, String> {
         .lines()
         .map(str::trim)
         .find(|line| !line.is_empty() && !line.starts_with('#'));
-    let stare = |(i, line): (usize, &str)| match step_stare(line.trim()) {
-        Some(angles_rad) => Ok(Stop::new(SweepMode::Pointing, angles_rad)),
-        None => Err(format!(
-            "line {}: azimuth and elevation in degrees as 340.004090.000 are needed",
-            i + 1
-        )),
-    };
-    let stops = match first {
-        Some(line) if step_stare(line).is_some() => {
-            let lines = text
-                .lines()
-                .enumerate()
-                .filter(|(_, line)| !line.trim().is_empty());
-            lines.map(stare).collect::<Result<Vec<_>, String>>()?
-        }
+    let lines = match first {
+        Some(line) if step_stare(line).is_some() => step_stare_lines(text)?,
         _ => table(&TextTable::parse(text)?)?,
     };
-    if stops.is_empty() || stops.len() > MOST_ROWS {
+    if lines.is_empty() || lines.len() > MOST_ROWS {
         return Err(format!(
             "{} lines of sight: from 1 to {MOST_ROWS} are allowed",
-            stops.len()
+            lines.len()
         ));
     }
-    Ok(stops)
+    Ok(lines)
+}
+
+/// The lines of a step-stare scan.
+fn step_stare_lines(text: &str) -> Result<Vec<Stop>, String> {
+    let mut lines = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() {
+            continue;
+        }
+        let angles_rad = step_stare(line).ok_or_else(|| {
+            format!(
+                "line {}: azimuth and elevation in degrees as 340.004090.000 are needed",
+                index + 1
+            )
+        })?;
+        lines.push(Stop::new(SweepMode::Pointing, angles_rad));
+    }
+    Ok(lines)
 }
 
 /// Angles, rad, of a line such as `340.004090.000`.
 fn step_stare(line: &str) -> Option<[f64; 2]> {
     let azimuth = line.get(..7)?;
     let elevation = line.get(7..14).filter(|_| line.len() == 14)?;
-    let angle = |text: &str| {
-        let digits = text
-            .bytes()
-            .enumerate()
-            .all(|(i, b)| b.is_ascii_digit() || (i == 3 && b == b'.') || (i == 0 && b == b'-'));
-        text.parse::<f64>()
-            .ok()
-            .filter(|_| digits)
-            .map(f64::to_radians)
-    };
-    Some([angle(azimuth)?, angle(elevation)?])
+    Some([step_stare_angle(azimuth)?, step_stare_angle(elevation)?])
+}
+
+/// An angle in degrees of seven characters with the point at the fourth, in rad.
+fn step_stare_angle(text: &str) -> Option<f64> {
+    for (index, byte) in text.bytes().enumerate() {
+        let is_allowed = match byte {
+            b'.' => index == 3,
+            b'-' => index == 0,
+            byte => byte.is_ascii_digit(),
+        };
+        if !is_allowed {
+            return None;
+        }
+    }
+    Some(text.parse::<f64>().ok()?.to_radians())
 }
 
 fn table(table: &TextTable) -> Result<Vec<Stop>, String> {
-    if let Some(other) = table.header.iter().find(|name| {
-        !COLUMNS
-            .split(", ")
-            .any(|known| known.eq_ignore_ascii_case(name))
-    }) {
-        return Err(format!("column {other:?} is not known: {COLUMNS} are"));
+    for name in &table.header {
+        let mut known = COLUMNS.split(", ");
+        if !known.any(|known| known.eq_ignore_ascii_case(name)) {
+            return Err(format!("column {name:?} is not known: {COLUMNS} are"));
+        }
     }
-    let column = |name: &str| table.column(name);
-    let angle = |name: &str| match (
-        column(&format!("{name}_rad")),
-        column(&format!("{name}_deg")),
-    ) {
-        (Some(at), None) => Ok((at, false)),
-        (None, Some(at)) => Ok((at, true)),
-        (Some(_), Some(_)) => Err(format!("{name}_rad and {name}_deg: one of them")),
-        (None, None) => Err(format!("no column {name}_rad or {name}_deg")),
-    };
-    let (azimuth, in_degrees) = angle("azimuth")?;
-    let (elevation, also) = angle("elevation")?;
-    if in_degrees != also {
+    let (azimuth, in_degrees) = angle_column(table, "azimuth")?;
+    let (elevation, elevation_in_degrees) = angle_column(table, "elevation")?;
+    if in_degrees != elevation_in_degrees {
         return Err(
             "azimuth and elevation are in different units: both in _rad, or both in _deg".into(),
         );
     }
-    let unit = if in_degrees {
+    let unit_rad = if in_degrees {
         std::f64::consts::PI / 180.0
     } else {
         1.0
     };
-    let number = |row: usize, at: usize, low: f64, high: f64| -> Result<f64, String> {
-        let value = table.number(row, at);
-        let name = &table.header[at];
-        let cell = &table.rows[row][at];
-        let good = (low..=high).contains(&value);
-        if good {
-            Ok(value)
-        } else {
-            Err(format!(
-                "row {}: {name} = {cell:?}: a number from {low} to {high}",
-                row + 1
-            ))
-        }
-    };
-    let triple = |names: [&str; 3]| -> Result<Option<[usize; 3]>, String> {
-        let places = names.map(column);
-        match places {
-            [Some(a), Some(b), Some(c)] => Ok(Some([a, b, c])),
-            [None, None, None] => Ok(None),
-            _ => Err(format!("columns {}: all three or none", names.join(", "))),
-        }
-    };
-    let place = triple(["x_m", "y_m", "z_m"])?;
-    let velocity = triple(["u_m_s", "v_m_s", "w_m_s"])?;
-    let mut out: Vec<Stop> = Vec::with_capacity(table.rows.len());
+    let position = vector_columns(table, ["x_m", "y_m", "z_m"])?;
+    let velocity = vector_columns(table, ["u_m_s", "v_m_s", "w_m_s"])?;
+    let up = 90f64.to_radians() / unit_rad;
+    let turns = 720f64.to_radians() / unit_rad;
+    let mut lines: Vec<Stop> = Vec::with_capacity(table.rows.len());
     for row in 0..table.rows.len() {
-        let up = 90f64.to_radians() / unit;
-        let turns = 720f64.to_radians() / unit;
         let angles_rad = [
-            number(row, azimuth, -turns, turns)? * unit,
-            number(row, elevation, -up, up)? * unit,
+            number(table, row, azimuth, -turns..=turns)? * unit_rad,
+            number(table, row, elevation, -up..=up)? * unit_rad,
         ];
-        let mut stop = Stop::new(SweepMode::Pointing, angles_rad);
-        let of_column = |name: &str, low, high| {
-            column(name)
-                .map(|at| number(row, at, low, high))
-                .transpose()
+        let mut line = Stop::new(SweepMode::Pointing, angles_rad);
+        line.time_s = optional_number(table, row, "time_s", 0.0..=1e9)?;
+        line.pulses = whole_number(table, row, "pulses", 1.0..=1e6)?;
+        line.sweep = whole_number(table, row, "sweep", 0.0..=1e5)?.unwrap_or(line.sweep);
+        place_in_sweep(table, row, lines.last(), &mut line)?;
+        let position_m = match position {
+            Some(columns) => Some(vector(table, row, columns, 1e6)?),
+            None => None,
         };
-        let whole = |name: &str, low, high| match of_column(name, low, high)? {
-            Some(value) if value.fract() != 0.0 => {
-                Err(format!("row {}: {name} = {value}: a whole number", row + 1))
-            }
-            value => Ok(value.map(|value| value as usize)),
+        let velocity_m_s = match velocity {
+            Some(columns) => vector(table, row, columns, 1e3)?,
+            None => [0.0; 3],
         };
-        stop.time_s = of_column("time_s", 0.0, 1e9)?;
-        stop.pulses = whole("pulses", 1.0, 1e6)?;
-        stop.sweep = whole("sweep", 0.0, 1e5)?.unwrap_or(stop.sweep);
-        let before = out.last();
-        let next = before.map_or(0, |b| b.sweep + 1);
-        if stop.sweep > next || before.is_some_and(|b| stop.sweep < b.sweep) {
-            return Err(format!(
-                "row {}: sweep = {}: sweeps count from 0 without gaps",
-                row + 1,
-                stop.sweep
-            ));
-        }
-        if let Some(at) = column("mode") {
-            let name = table.rows[row][at].trim();
-            let names = SweepMode::ALL.map(SweepMode::name).join(", ");
-            let known = SweepMode::ALL.into_iter().find(|mode| mode.name() == name);
-            stop.mode =
-                known.ok_or_else(|| format!("row {}: mode = {name:?}: one of {names}", row + 1))?;
-            stop.apart = stop.mode.is_pointing();
-            if before.is_some_and(|b| b.sweep == stop.sweep && b.mode != stop.mode) {
-                return Err(format!(
-                    "row {}: mode = {name:?}: the rows of a sweep have one mode",
-                    row + 1
-                ));
-            }
-        }
-        let vector = |places: [usize; 3], most: f64| -> Result<[f64; 3], String> {
-            let [a, b, c] = places.map(|at| number(row, at, -most, most));
-            Ok([a?, b?, c?])
-        };
-        let place_m = place.map(|places| vector(places, 1e6)).transpose()?;
-        let velocity_m_s = velocity
-            .map(|places| vector(places, 1e3))
-            .transpose()?
-            .unwrap_or_default();
-        if velocity.is_some() && place.is_none() {
+        if velocity.is_some() && position.is_none() {
             return Err("columns u_m_s, v_m_s, w_m_s need x_m, y_m, z_m".into());
         }
-        stop.carrier = place_m.map(|place_m| (place_m, velocity_m_s));
-        out.push(stop);
+        line.carrier = position_m.map(|position_m| (position_m, velocity_m_s));
+        lines.push(line);
     }
-    Ok(out)
+    Ok(lines)
+}
+
+/// Column of an angle, and whether it is in degrees.
+fn angle_column(table: &TextTable, name: &str) -> Result<(usize, bool), String> {
+    let in_rad = table.column(&format!("{name}_rad"));
+    let in_degrees = table.column(&format!("{name}_deg"));
+    match (in_rad, in_degrees) {
+        (Some(column), None) => Ok((column, false)),
+        (None, Some(column)) => Ok((column, true)),
+        (Some(_), Some(_)) => Err(format!("{name}_rad and {name}_deg: one of them")),
+        (None, None) => Err(format!("no column {name}_rad or {name}_deg")),
+    }
+}
+
+/// Columns of the three components of a vector, if the table has them.
+fn vector_columns(table: &TextTable, names: [&str; 3]) -> Result<Option<[usize; 3]>, String> {
+    match names.map(|name| table.column(name)) {
+        [Some(a), Some(b), Some(c)] => Ok(Some([a, b, c])),
+        [None, None, None] => Ok(None),
+        _ => Err(format!("columns {}: all three or none", names.join(", "))),
+    }
+}
+
+/// The number in a cell.
+fn number(
+    table: &TextTable,
+    row: usize,
+    column: usize,
+    allowed: RangeInclusive<f64>,
+) -> Result<f64, String> {
+    let value = table.number(row, column);
+    if allowed.contains(&value) {
+        return Ok(value);
+    }
+    let name = &table.header[column];
+    let cell = &table.rows[row][column];
+    let low = allowed.start();
+    let high = allowed.end();
+    Err(format!(
+        "row {}: {name} = {cell:?}: a number from {low} to {high}",
+        row + 1
+    ))
+}
+
+/// The number in a cell of a column that need not be there.
+fn optional_number(
+    table: &TextTable,
+    row: usize,
+    name: &str,
+    allowed: RangeInclusive<f64>,
+) -> Result<Option<f64>, String> {
+    match table.column(name) {
+        Some(column) => number(table, row, column, allowed).map(Some),
+        None => Ok(None),
+    }
+}
+
+/// The whole number in a cell of a column that need not be there.
+fn whole_number(
+    table: &TextTable,
+    row: usize,
+    name: &str,
+    allowed: RangeInclusive<f64>,
+) -> Result<Option<usize>, String> {
+    match optional_number(table, row, name, allowed)? {
+        Some(value) if value.fract() != 0.0 => {
+            Err(format!("row {}: {name} = {value}: a whole number", row + 1))
+        }
+        value => Ok(value.map(|value| value as usize)),
+    }
+}
+
+/// The three components of a vector, each at most `most` in size.
+fn vector(
+    table: &TextTable,
+    row: usize,
+    columns: [usize; 3],
+    most: f64,
+) -> Result<[f64; 3], String> {
+    let mut vector = [0.0; 3];
+    for (component, column) in vector.iter_mut().zip(columns) {
+        *component = number(table, row, column, -most..=most)?;
+    }
+    Ok(vector)
+}
+
+/// Checks the sweep of a line against the line before it, and reads its mode.
+fn place_in_sweep(
+    table: &TextTable,
+    row: usize,
+    before: Option<&Stop>,
+    line: &mut Stop,
+) -> Result<(), String> {
+    let next = before.map_or(0, |before| before.sweep + 1);
+    if line.sweep > next || before.is_some_and(|before| line.sweep < before.sweep) {
+        return Err(format!(
+            "row {}: sweep = {}: sweeps count from 0 without gaps",
+            row + 1,
+            line.sweep
+        ));
+    }
+    let Some(column) = table.column("mode") else {
+        return Ok(());
+    };
+    let name = table.rows[row][column].trim();
+    let mut modes = SweepMode::ALL.into_iter();
+    line.mode = modes.find(|mode| mode.name() == name).ok_or_else(|| {
+        let names = SweepMode::ALL.map(SweepMode::name).join(", ");
+        format!("row {}: mode = {name:?}: one of {names}", row + 1)
+    })?;
+    line.apart = line.mode.is_pointing();
+    if before.is_some_and(|before| before.sweep == line.sweep && before.mode != line.mode) {
+        return Err(format!(
+            "row {}: mode = {name:?}: the rows of a sweep have one mode",
+            row + 1
+        ));
+    }
+    Ok(())
 }
 
 #[cfg(test)]

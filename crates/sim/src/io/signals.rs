@@ -55,62 +55,32 @@ impl RawSignals<'_> {
     /// Lengths that do not match, times that do not increase, values that are not finite.
     pub fn check(&self) -> OutputResult<()> {
         increasing("time_s", &self.time_s)?;
-        same_length(
-            "current_a",
-            self.current_a.ncols(),
-            "time_s",
-            self.time_s.len(),
-        )?;
+        let (records, samples) = self.current_a.dim();
+        let times = self.time_s.len();
+        same_length("current_a", samples, "time_s", times)?;
         let pulses = self.elevation_rad.len();
-        same_length(
-            "current_a",
-            self.current_a.nrows(),
-            "elevation_rad",
-            pulses * self.realisations(),
-        )?;
-        same_length(
-            "pulse_time_s",
-            self.pulse_time_s.len(),
-            "elevation_rad",
-            pulses,
-        )?;
-        if !self.azimuth_rad.is_empty() {
-            same_length(
-                "azimuth_rad",
-                self.azimuth_rad.len(),
-                "elevation_rad",
-                pulses,
-            )?;
+        let expected = pulses * self.realisations();
+        same_length("current_a", records, "elevation_rad", expected)?;
+        let pulse_times = self.pulse_time_s.len();
+        same_length("pulse_time_s", pulse_times, "elevation_rad", pulses)?;
+        let azimuths = self.azimuth_rad.len();
+        if azimuths > 0 {
+            same_length("azimuth_rad", azimuths, "elevation_rad", pulses)?;
         }
         if let Some(quadrature) = &self.quadrature_a {
-            same_length(
-                "quadrature_a",
-                quadrature.nrows(),
-                "current_a",
-                self.current_a.nrows(),
-            )?;
-            same_length(
-                "quadrature_a",
-                quadrature.ncols(),
-                "time_s",
-                self.time_s.len(),
-            )?;
+            same_length("quadrature_a", quadrature.nrows(), "current_a", records)?;
+            same_length("quadrature_a", quadrature.ncols(), "time_s", times)?;
         }
         increasing("range_m", &self.range_m)?;
         let (lines, ranges) = self.radial_velocity_m_s.dim();
         same_length("radial_velocity_m_s", ranges, "range_m", self.range_m.len())?;
-        same_length(
-            "radial_velocity_m_s",
-            lines,
-            "the lines",
-            self.first_pulse.len(),
-        )?;
-        match self
+        let expected = self.first_pulse.len();
+        same_length("radial_velocity_m_s", lines, "the lines", expected)?;
+        let mut values = self
             .current_a
             .iter()
-            .chain(self.quadrature_a.iter().flatten())
-            .find(|a| !a.is_finite())
-        {
+            .chain(self.quadrature_a.iter().flatten());
+        match values.find(|a| !a.is_finite()) {
             Some(bad) => Err(OutputError::value("current_a", bad, "must be finite")),
             None => Ok(()),
         }

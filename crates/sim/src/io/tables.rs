@@ -5,34 +5,53 @@ use super::csv::Table;
 use super::error::OutputResult;
 use super::map::{CrossPlanes, VelocityMap};
 
-/// The table of a map: `tau, range_m, elevation_rad, y_m, z_m`, then the fields in order, then `azimuth_rad, time_s, sweep, ray`.
-/// One row per (ray, gate), the gate running fastest.
+/// The table of a map: `tau, range_m, elevation_rad, y_m, z_m`, then the fields in order, then `x_m` of a map with a flight and
+/// `azimuth_rad, time_s, sweep, ray`. One row per (ray, gate), the gate running fastest.
 ///
 /// # Errors
 /// What [`VelocityMap::check`] finds.
 pub fn map_table(map: &VelocityMap) -> OutputResult<Table> {
     map.check()?;
-    let gates = map.range_m.len();
-    let cells = || (0..map.rays.len() * gates).map(|cell| (cell / gates, cell % gates));
-    let per_ray =
-        |get: &dyn Fn(usize) -> f64| -> Vec<f64> { cells().map(|(r, _)| get(r)).collect() };
+    let mut tau = Vec::new();
+    let mut range_m = Vec::new();
+    let mut elevation_rad = Vec::new();
+    let mut position_m = [const { Vec::new() }; 3];
+    let mut azimuth_rad = Vec::new();
+    let mut time_s = Vec::new();
+    let mut sweep = Vec::new();
+    let mut number = Vec::new();
+    for (index, ray) in map.rays.iter().enumerate() {
+        for (gate, gate_range_m) in map.range_m.iter().enumerate() {
+            tau.push(map.sweeps[ray.sweep].tau);
+            range_m.push(*gate_range_m);
+            elevation_rad.push(ray.elevation_rad);
+            for (all, coordinate_m) in position_m.iter_mut().zip(map.place_m(index, gate)) {
+                all.push(coordinate_m);
+            }
+            azimuth_rad.push(ray.azimuth_rad);
+            time_s.push(ray.time_s);
+            sweep.push(ray.sweep as i64);
+            number.push(index as i64);
+        }
+    }
+    let [x_m, y_m, z_m] = position_m;
     let mut table = Table::new()
-        .float("tau", per_ray(&|r| map.sweeps[map.rays[r].sweep].tau))
-        .float("range_m", cells().map(|(_, g)| map.range_m[g]))
-        .float("elevation_rad", per_ray(&|r| map.rays[r].elevation_rad))
-        .float("y_m", cells().map(|(r, g)| map.place_m(r, g)[1]))
-        .float("z_m", cells().map(|(r, g)| map.place_m(r, g)[2]));
+        .float("tau", tau)
+        .float("range_m", range_m)
+        .float("elevation_rad", elevation_rad)
+        .float("y_m", y_m)
+        .float("z_m", z_m);
     for field in &map.fields {
         table = table.float(&field.column(), field.values.iter().copied());
     }
     if map.flight.is_some() {
-        table = table.float("x_m", cells().map(|(r, g)| map.place_m(r, g)[0]));
+        table = table.float("x_m", x_m);
     }
     Ok(table
-        .float("azimuth_rad", per_ray(&|r| map.rays[r].azimuth_rad))
-        .float("time_s", per_ray(&|r| map.rays[r].time_s))
-        .int("sweep", cells().map(|(r, _)| map.rays[r].sweep as i64))
-        .int("ray", cells().map(|(r, _)| r as i64)))
+        .float("azimuth_rad", azimuth_rad)
+        .float("time_s", time_s)
+        .int("sweep", sweep)
+        .int("ray", number))
 }
 
 /// The table of cross-planes: `tau, z_m, y_m, v_m_s, w_m_s, time_s`, with `y_m` running fastest.
@@ -41,16 +60,27 @@ pub fn map_table(map: &VelocityMap) -> OutputResult<Table> {
 /// What [`CrossPlanes::check`] finds.
 pub fn planes_table(planes: &CrossPlanes) -> OutputResult<Table> {
     planes.check()?;
-    let ny = planes.y_m.len();
-    let nz = planes.z_m.len();
-    let cells = || 0..planes.tau.len() * nz * ny;
+    let mut tau = Vec::new();
+    let mut z_m = Vec::new();
+    let mut y_m = Vec::new();
+    let mut time_s = Vec::new();
+    for (plane_tau, plane_time_s) in planes.tau.iter().zip(&planes.time_s) {
+        for height_m in &planes.z_m {
+            for across_m in &planes.y_m {
+                tau.push(*plane_tau);
+                z_m.push(*height_m);
+                y_m.push(*across_m);
+                time_s.push(*plane_time_s);
+            }
+        }
+    }
     Ok(Table::new()
-        .float("tau", cells().map(|i| planes.tau[i / (nz * ny)]))
-        .float("z_m", cells().map(|i| planes.z_m[i / ny % nz]))
-        .float("y_m", cells().map(|i| planes.y_m[i % ny]))
+        .float("tau", tau)
+        .float("z_m", z_m)
+        .float("y_m", y_m)
         .float("v_m_s", planes.v_m_s.iter().copied())
         .float("w_m_s", planes.w_m_s.iter().copied())
-        .float("time_s", cells().map(|i| planes.time_s[i / (nz * ny)])))
+        .float("time_s", time_s))
 }
 
 #[cfg(test)]

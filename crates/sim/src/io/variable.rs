@@ -1,7 +1,7 @@
 //! Variables of measurements in SI, whichever file has them: their names, their units, and what stands beside them for each ray or
 //! sweep.
 //!
-//! A file is a [`Source`]: NetCDF, whose numbers come unpacked, or a table, whose columns have their units in their names. Variables
+//! A file is a [`VariableSource`]: NetCDF, whose numbers come unpacked, or a table, whose columns have their units in their names. Variables
 //! are found by the names of CfRadial, Windcube, HALO and level-1 files or by their standard names, and what cannot be understood is an
 //! error with the name and the attributes of the variable. Check: each unit and each spelling of a quantity gives the same
 //! values; what is ambiguous is refused.
@@ -14,9 +14,9 @@ use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
 /// A file with named variables.
-pub(crate) trait Source {
+pub(crate) trait VariableSource {
     /// Whether a length without a unit is in metres and an angle in degrees, as in CfRadial.
-    const HAS_USUAL_UNITS: bool;
+    fn has_usual_units(&self) -> bool;
     /// Names of all variables.
     fn names(&self) -> Vec<&str>;
     /// A text attribute of a variable.
@@ -35,8 +35,10 @@ pub(crate) trait Source {
     fn named_text(&self, name: &str) -> Option<String>;
 }
 
-impl Source for NetcdfFile {
-    const HAS_USUAL_UNITS: bool = true;
+impl VariableSource for NetcdfFile {
+    fn has_usual_units(&self) -> bool {
+        true
+    }
 
     fn names(&self) -> Vec<&str> {
         NetcdfFile::names(self).collect()
@@ -59,8 +61,10 @@ impl Source for NetcdfFile {
     }
 }
 
-impl Source for TextTable {
-    const HAS_USUAL_UNITS: bool = false;
+impl VariableSource for TextTable {
+    fn has_usual_units(&self) -> bool {
+        false
+    }
 
     fn names(&self) -> Vec<&str> {
         self.header.iter().map(String::as_str).collect()
@@ -81,18 +85,16 @@ impl Source for TextTable {
     fn texts(&self, name: &str) -> Result<Vec<String>, String> {
         let column = self.column(name);
         let column = column.ok_or_else(|| format!("it has no column {name}"))?;
-        let is_text = |row: usize| {
-            let cell = self.rows[row][column].trim();
-            !cell.is_empty()
-                && self.number(row, column).is_nan()
-                && !cell.eq_ignore_ascii_case("nan")
-        };
-        match (0..self.rows.len()).any(is_text) {
-            true => Ok(self
-                .rows
-                .iter()
-                .map(|cells| cells[column].clone())
-                .collect()),
+        let mut has_text = false;
+        let mut texts = Vec::with_capacity(self.rows.len());
+        for (row, cells) in self.rows.iter().enumerate() {
+            let cell = cells[column].trim();
+            let is_missing = cell.is_empty() || cell.eq_ignore_ascii_case("nan");
+            has_text |= !is_missing && self.number(row, column).is_nan();
+            texts.push(cells[column].clone());
+        }
+        match has_text {
+            true => Ok(texts),
             false => Err(format!("column {name} has no texts")),
         }
     }
@@ -103,7 +105,7 @@ impl Source for TextTable {
 }
 
 /// The names of one variable.
-pub(crate) struct Memo {
+pub(crate) struct VariableNames {
     /// Words between blanks, the preferred one first; small and capital letters are alike.
     names: &'static str,
     standard_names: &'static [&'static str],
@@ -113,12 +115,12 @@ pub(crate) const AWAY: &str = "radial_velocity_of_scatterers_away_from_instrumen
 pub(crate) const TOWARDS: &str = "radial_velocity_of_scatterers_toward_instrument";
 
 /// Radial velocities, positive away unless the standard name says otherwise.
-pub(crate) const VELOCITY: Memo = Memo {
+pub(crate) const VELOCITY: VariableNames = VariableNames {
     names: "radial_velocity velocity v_mean radial_wind_speed vel vr vrad vradh doppler_velocity mean_doppler_velocity dv v_raw",
     standard_names: &[AWAY, TOWARDS],
 };
 /// Standard deviations of radial velocities.
-pub(crate) const SIGMA: Memo = Memo {
+pub(crate) const SIGMA: VariableNames = VariableNames {
     names: "velocity_standard_deviation sigma std predicted_std radial_velocity_error velocity_error errdv radial_velocity_std",
     standard_names: &[
         "radial_velocity_of_scatterers_away_from_instrument standard_error",
@@ -126,15 +128,15 @@ pub(crate) const SIGMA: Memo = Memo {
     ],
 };
 /// Ratios of signal and noise.
-pub(crate) const RATIO: Memo = Memo {
+pub(crate) const RATIO: VariableNames = VariableNames {
     names: "signal_to_noise_ratio snr cnr carrier_to_noise_ratio intensity signal_to_noise_ratio_plus_one snr_plus_one",
     standard_names: &["signal_to_noise_ratio"],
 };
-pub(crate) const RANGE: Memo = Memo {
+pub(crate) const RANGE: VariableNames = VariableNames {
     names: "range distance slant_range",
     standard_names: &["projection_range_coordinate"],
 };
-pub(crate) const ELEVATION: Memo = Memo {
+pub(crate) const ELEVATION: VariableNames = VariableNames {
     names: "elevation elevation_angle ele elev",
     standard_names: &[
         "ray_elevation_angle",
@@ -143,11 +145,11 @@ pub(crate) const ELEVATION: Memo = Memo {
     ],
 };
 /// Angles from the zenith, where a file has no elevations.
-pub(crate) const ZENITH: Memo = Memo {
+pub(crate) const ZENITH: VariableNames = VariableNames {
     names: "zenith zenith_angle",
     standard_names: &["zenith_angle", "sensor_zenith_angle"],
 };
-pub(crate) const AZIMUTH: Memo = Memo {
+pub(crate) const AZIMUTH: VariableNames = VariableNames {
     names: "azimuth azimuth_angle azi",
     standard_names: &[
         "ray_azimuth_angle",
@@ -155,44 +157,47 @@ pub(crate) const AZIMUTH: Memo = Memo {
         "beam_azimuth_angle",
     ],
 };
-pub(crate) const TIME: Memo = Memo {
+pub(crate) const TIME: VariableNames = VariableNames {
     names: "time timestamp",
     standard_names: &["time"],
 };
 /// Nyquist velocities: half the interval after which velocities repeat.
-pub(crate) const NYQUIST: Memo = Memo {
+pub(crate) const NYQUIST: VariableNames = VariableNames {
     names: "nyquist_velocity nyquist nyquist_vel nqv unambiguous_velocity",
     standard_names: &[],
 };
 /// 1 for rays while the head moves to the place of another scan.
-pub(crate) const TRANSITION: Memo = Memo {
+pub(crate) const TRANSITION: VariableNames = VariableNames {
     names: "antenna_transition",
     standard_names: &[],
 };
-pub(crate) const PULSE_WIDTH: Memo = Memo {
+pub(crate) const PULSE_WIDTH: VariableNames = VariableNames {
     names: "pulse_width pulse_duration",
     standard_names: &[],
 };
 
 /// The variable of a file that is known by one of these names.
-pub(crate) fn find<'s>(source: &'s impl Source, known: &Memo) -> Option<&'s str> {
+pub(crate) fn find<'s>(source: &'s dyn VariableSource, known: &VariableNames) -> Option<&'s str> {
     let names = source.names();
-    let exact = |wanted: &str| names.iter().find(|name| **name == wanted);
-    let of_letters = |wanted: &str| names.iter().find(|name| name.eq_ignore_ascii_case(wanted));
-    let of_column = |wanted: &str| {
-        let is_same = |name: &&&str| split_unit(name).0.eq_ignore_ascii_case(wanted);
-        names.iter().find(is_same)
-    };
-    let by_name = known.names.split(' ').find_map(|wanted| {
-        exact(wanted)
-            .or_else(|| of_letters(wanted))
-            .or_else(|| of_column(wanted))
-    });
-    let is_standard = |name: &&&str| {
+    for wanted in known.names.split(' ') {
+        let found = names
+            .iter()
+            .find(|name| **name == wanted)
+            .or_else(|| names.iter().find(|name| name.eq_ignore_ascii_case(wanted)))
+            .or_else(|| names.iter().find(|name| is_column(name, wanted)));
+        if found.is_some() {
+            return found.copied();
+        }
+    }
+    names.into_iter().find(|name| {
         let own = source.attribute(name, "standard_name").unwrap_or_default();
         known.standard_names.contains(&own)
-    };
-    by_name.or_else(|| names.iter().find(is_standard)).copied()
+    })
+}
+
+/// Whether the name of a column without its unit is this one, in small or capital letters.
+fn is_column(column: &str, name: &str) -> bool {
+    split_unit(column).0.eq_ignore_ascii_case(name)
 }
 
 /// Units behind the names of columns, the longer ones first.
@@ -238,7 +243,7 @@ fn split_unit(column: &str) -> (&str, Option<&str>) {
 }
 
 /// The unit of a variable: its attribute, or what its name ends with.
-fn units<'s>(source: &'s impl Source, name: &'s str) -> Option<&'s str> {
+fn units<'s>(source: &'s dyn VariableSource, name: &'s str) -> Option<&'s str> {
     let stated = source
         .attribute(name, "units")
         .filter(|units| !units.trim().is_empty());
@@ -249,14 +254,14 @@ fn units<'s>(source: &'s impl Source, name: &'s str) -> Option<&'s str> {
 ///
 /// # Errors
 /// A variable that cannot be read; a unit of another quantity, with the name and what is allowed.
-pub(crate) fn values<S: Source>(
-    source: &S,
+pub(crate) fn values(
+    source: &dyn VariableSource,
     name: &str,
     quantity: Quantity,
 ) -> Result<Vec<f64>, String> {
     let units = units(source, name).unwrap_or_default();
     let is_ambiguous = matches!(quantity, Quantity::Length | Quantity::Angle);
-    if units.is_empty() && is_ambiguous && !S::HAS_USUAL_UNITS {
+    if units.is_empty() && is_ambiguous && !source.has_usual_units() {
         return Err(format!(
             "column {name} has no unit in its name, such as {name}_{}",
             if quantity == Quantity::Angle {
@@ -285,7 +290,9 @@ fn shown(name: &str) -> String {
 ///
 /// # Errors
 /// As [`values`].
-pub(crate) fn elevations_rad(source: &impl Source) -> Result<Option<(&str, Vec<f64>)>, String> {
+pub(crate) fn elevations_rad(
+    source: &dyn VariableSource,
+) -> Result<Option<(&str, Vec<f64>)>, String> {
     if let Some(name) = find(source, &ELEVATION) {
         return Ok(Some((name, values(source, name, Quantity::Angle)?)));
     }
@@ -342,7 +349,7 @@ enum RatioForm {
 ///
 /// # Errors
 /// A variable that cannot be read; a unit that is neither; one without a unit whose values do not say which they are.
-pub(crate) fn ratio_db(source: &impl Source, name: &str) -> Result<Vec<f64>, String> {
+pub(crate) fn ratio_db(source: &dyn VariableSource, name: &str) -> Result<Vec<f64>, String> {
     let stored = source.numbers(name)?;
     let units = units(source, name).unwrap_or_default();
     let is_plus_one = is_plus_one(source, name);
@@ -384,29 +391,29 @@ pub(crate) fn decibels(ratio: f64) -> f64 {
     }
 }
 
-/// Whether a variable is a ratio of signal and noise plus 1: by its name, or by the words of its attributes.
-fn is_plus_one(source: &impl Source, name: &str) -> bool {
-    let words = [
+/// Whether a variable is a ratio of signal and noise plus 1: by its name, or by its attributes.
+fn is_plus_one(source: &dyn VariableSource, name: &str) -> bool {
+    if is_column(name, "intensity") || says_plus_one(name) {
+        return true;
+    }
+    let attributes = [
         "long_name",
         "standard_name",
         "comment",
         "description",
         "units",
     ];
-    let texts = words.iter().filter_map(|word| source.attribute(name, word));
-    let says_so = |text: &str| {
-        let plain: String = text
-            .to_ascii_lowercase()
-            .chars()
-            .filter(|c| c.is_ascii_alphanumeric() || *c == '+')
-            .collect();
-        ["ratio+1", "snr+1", "1+snr", "cnr+1", "plus1", "plusone"]
-            .iter()
-            .any(|form| plain.contains(form))
-    };
-    split_unit(name).0.eq_ignore_ascii_case("intensity")
-        || says_so(name)
-        || texts.into_iter().any(says_so)
+    attributes
+        .iter()
+        .any(|attribute| source.attribute(name, attribute).is_some_and(says_plus_one))
+}
+
+fn says_plus_one(text: &str) -> bool {
+    let mut plain = text.to_ascii_lowercase();
+    plain.retain(|c| c.is_ascii_alphanumeric() || c == '+');
+    ["ratio+1", "snr+1", "1+snr", "cnr+1", "plus1", "plusone"]
+        .iter()
+        .any(|form| plain.contains(form))
 }
 
 /// Noise alone has a ratio plus 1 of about 1: where most are far below, the variable is something else.
@@ -469,7 +476,7 @@ const FAR_S: f64 = 4e9;
 ///
 /// # Errors
 /// A variable that cannot be read, or has another number of values.
-pub(crate) fn times(source: &impl Source, count: usize) -> Result<Times, String> {
+pub(crate) fn times(source: &dyn VariableSource, count: usize) -> Result<Times, String> {
     let Some(name) = find(source, &TIME) else {
         return Ok(Times::unknown(count, None));
     };
@@ -486,23 +493,25 @@ pub(crate) fn times(source: &impl Source, count: usize) -> Result<Times, String>
 }
 
 fn times_of_texts(name: &str, texts: &[String]) -> Times {
-    let dates: Vec<Option<(UtcTime, f64)>> = texts
-        .iter()
-        .map(|text| UtcTime::parse_reference(text))
-        .collect();
-    let Some(first) = dates.iter().flatten().next().copied() else {
+    let mut dates = Vec::with_capacity(texts.len());
+    for text in texts {
+        dates.push(UtcTime::parse_reference(text));
+    }
+    let Some((first, _)) = dates.iter().flatten().next().copied() else {
         let found = texts.first().map_or("", String::as_str);
         return Times::unknown(texts.len(), Some(not_understood(name, found)));
     };
-    let after = |date: &Option<(UtcTime, f64)>| {
-        date.map_or(f64::NAN, |(date, fraction_s)| {
-            date.seconds_since(first.0) + fraction_s
-        })
-    };
-    Times::after((first.0, 0.0), dates.iter().map(after).collect())
+    let mut time_s = Vec::with_capacity(dates.len());
+    for date in dates {
+        time_s.push(match date {
+            Some((date, fraction_s)) => date.seconds_since(first) + fraction_s,
+            None => f64::NAN,
+        });
+    }
+    Times::after((first, 0.0), time_s)
 }
 
-fn times_of_numbers(source: &impl Source, name: &str) -> Result<Times, String> {
+fn times_of_numbers(source: &dyn VariableSource, name: &str) -> Result<Times, String> {
     let numbers = source.numbers(name)?;
     let units = units(source, name).unwrap_or_default();
     let (unit, date) = split_date(units);
@@ -512,7 +521,8 @@ fn times_of_numbers(source: &impl Source, name: &str) -> Result<Times, String> {
         unit => Quantity::Time.si(unit),
     };
     let reference = reference(source, name);
-    let (Ok(unit_s), true) = (unit_s, date.is_none() || reference.is_some()) else {
+    let is_understood = date.is_none() || reference.is_some();
+    let Some(unit_s) = unit_s.ok().filter(|_| is_understood) else {
         let calendar = source.attribute(name, "calendar").unwrap_or_default();
         let said = format!("{units} {calendar}");
         let why = not_understood(name, said.trim());
@@ -531,7 +541,7 @@ fn times_of_numbers(source: &impl Source, name: &str) -> Result<Times, String> {
 
 /// The date from which a variable counts time, with the fraction of a second beyond it: that in its units, or that of a text of the file
 /// whose name stands there.
-pub(crate) fn reference(source: &impl Source, name: &str) -> Option<(UtcTime, f64)> {
+pub(crate) fn reference(source: &dyn VariableSource, name: &str) -> Option<(UtcTime, f64)> {
     let calendar = source.attribute(name, "calendar").unwrap_or_default();
     let is_civil = ["", "standard", "gregorian", "proleptic_gregorian"]
         .contains(&calendar.to_ascii_lowercase().as_str());

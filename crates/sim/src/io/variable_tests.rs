@@ -29,8 +29,10 @@ impl Given {
     }
 }
 
-impl Source for Given {
-    const HAS_USUAL_UNITS: bool = true;
+impl VariableSource for Given {
+    fn has_usual_units(&self) -> bool {
+        true
+    }
 
     fn names(&self) -> Vec<&str> {
         self.variables.keys().copied().collect()

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use wakescope_sim::cli::{Answer, Host, Refusal, call};
 use wakescope_sim::io::Existing;
-use wakescope_sim::io::raw::{RawRecords, Source};
+use wakescope_sim::io::raw::{RawRecords, RecordSource};
 use wakescope_sim::{Silent, write_contents};
 
 const SCENE: &str = "scan.elevation_min_rad = 0.1\nscan.elevation_max_rad = 0.11\nscan.pulses_per_line = 1\n\
@@ -70,7 +70,7 @@ fn kept_files_are_those_that_are_written() {
 #[derive(Debug)]
 struct Memory(Vec<f64>, usize);
 
-impl Source for Memory {
+impl RecordSource for Memory {
     fn read(
         &mut self,
         records: Range<usize>,

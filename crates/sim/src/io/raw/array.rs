@@ -2,7 +2,7 @@
 //!
 //! Check: every order of an array gives the same records.
 
-use super::Source;
+use super::RecordSource;
 use super::numpy::StoredArray;
 use num_complex::Complex;
 use std::fs::File;
@@ -35,7 +35,7 @@ pub(super) struct ArrayInFile {
     pub(super) pulses_per_line: usize,
 }
 
-impl Source for ArrayInFile {
+impl RecordSource for ArrayInFile {
     fn read(
         &mut self,
         records: Range<usize>,

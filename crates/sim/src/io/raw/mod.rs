@@ -113,7 +113,7 @@ pub struct About {
 }
 
 /// Where samples come from.
-pub trait Source: std::fmt::Debug {
+pub trait RecordSource: std::fmt::Debug {
     /// Some samples of some records as they stand there, one record after the other; the second parts of real ones are of no matter.
     ///
     /// # Errors
@@ -130,7 +130,7 @@ pub trait Source: std::fmt::Debug {
 pub struct RawRecords {
     /// The file, or what stands for one in words and messages.
     pub path: PathBuf,
-    source: Box<dyn Source + Send>,
+    source: Box<dyn RecordSource + Send>,
     /// Number of records.
     pub records: usize,
     /// Samples of a record.
@@ -216,7 +216,7 @@ impl RawRecords {
     /// Records of so many samples that a source has; `are_integers` says that the numbers are codes of a converter.
     pub fn new(
         path: &Path,
-        source: impl Source + Send + 'static,
+        source: impl RecordSource + Send + 'static,
         [records, samples]: [usize; 2],
         is_complex: bool,
         are_integers: bool,

@@ -2,7 +2,7 @@
 //!
 //! Check: signals of a run come back; constants of the recording that the scene contradicts are named.
 
-use super::{About, RawFormat, RawRecords, Source};
+use super::{About, RawFormat, RawRecords, RecordSource};
 use crate::Error;
 use crate::io::netcdf_input::{NetcdfFile, open};
 use crate::io::number::middle_code;
@@ -107,7 +107,7 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
     })
 }
 
-impl Source for NetcdfRecords {
+impl RecordSource for NetcdfRecords {
     fn read(
         &mut self,
         records: Range<usize>,

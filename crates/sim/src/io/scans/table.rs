@@ -7,7 +7,7 @@ use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::csv_input::TextTable;
 use crate::io::netcdf_input::quoted;
 use crate::io::units::Quantity;
-use crate::io::variable::{self, AZIMUTH, Memo, RANGE, RATIO, SIGMA, Times, VELOCITY};
+use crate::io::variable::{self, AZIMUTH, RANGE, RATIO, SIGMA, Times, VELOCITY, VariableNames};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -108,7 +108,7 @@ fn rows(table: &TextTable, format: &ScanFormat, is_own: bool) -> Result<Rows, St
             })?,
         None => variable::find(table, &VELOCITY).ok_or_else(|| missing("velocity_m_s"))?,
     };
-    let optional = |known: &Memo, quantity| match variable::find(table, known) {
+    let optional = |known: &VariableNames, quantity| match variable::find(table, known) {
         Some(name) => variable::values(table, name, quantity).map(Some),
         None => Ok::<_, String>(None),
     };
