@@ -91,7 +91,7 @@ pub enum Error {
         /// A floor just large enough, to two digits; it was tried.
         least: f64,
     },
-    /// A fit did not come to its end.
+    /// A fit did not converge.
     #[error(
         "the fit is not converged after {iterations} iterations, {sigmas_left:.2e} standard deviations are left: \
          start nearer, free fewer parameters or allow more iterations"
@@ -122,7 +122,7 @@ pub enum Error {
     },
 }
 
-/// Refuses a number that is not as `allowed` tells.
+/// Fails with `allowed` as the reason unless `is_allowed`.
 pub(crate) fn check(
     field: &'static str,
     value: f64,
@@ -217,8 +217,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tiny_and_huge_values_are_told_in_few_digits() {
-        let told = |value| {
+    fn tiny_and_huge_values_are_printed_in_few_digits() {
+        let message = |value| {
             Error::OutOfRange {
                 field: "a_m",
                 value,
@@ -232,7 +232,7 @@ mod tests {
             (0.5, "0.5"),
             (f64::NAN, "NaN"),
         ] {
-            assert_eq!(told(value), format!("a_m = {text}: must be positive"));
+            assert_eq!(message(value), format!("a_m = {text}: must be positive"));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A number and how far off it may be.
+//! A number with its standard deviation.
 
 /// A number with its standard deviation; NaN where that is not known.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -17,7 +17,7 @@ impl Measured {
         Self { value, std: 0.0 }
     }
 
-    /// The share of `hits` among `trials`, with its binomial standard error.
+    /// The fraction of `hits` among `trials`, with its binomial standard error.
     #[must_use]
     pub fn share(hits: usize, trials: usize) -> Self {
         let value = hits as f64 / trials as f64;

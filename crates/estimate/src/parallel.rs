@@ -20,7 +20,7 @@ pub(crate) fn map_indexed<T: Send, W>(
     }
 }
 
-/// The same without a state.
+/// `f(index)` for every index below `count`, in order.
 pub(crate) fn map_each<T: Send>(count: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
     map_indexed(count, || (), |(), index| f(index))
 }

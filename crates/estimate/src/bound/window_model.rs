@@ -9,7 +9,7 @@ use ndarray::Array2;
 use ndarray_linalg::{Lapack, Scalar};
 use num_complex::Complex;
 
-use super::extended;
+use super::extended::GaussianWindow;
 use crate::error::{Error, check, finite, length, not_empty, positive};
 use crate::linalg::hermitian_eigen;
 use crate::window::{Sampling, SignalKind};
@@ -40,8 +40,9 @@ fn information(
     if kind == SignalKind::Complex {
         return trace(covariance, derivative);
     }
-    let real = |matrix: &Array2<Complex<f64>>| matrix.mapv(|value| value.re);
-    Ok(kind.one_sided_share() * trace(&real(covariance), &real(derivative))?)
+    let covariance = covariance.mapv(|value| value.re);
+    let derivative = derivative.mapv(|value| value.re);
+    Ok(kind.one_sided_share() * trace(&covariance, &derivative)?)
 }
 
 /// Least reciprocal condition of a covariance that is inverted, per unit of its order.
@@ -56,65 +57,61 @@ fn trace<T: Scalar<Real = f64> + Lapack>(
     covariance: &Array2<T>,
     derivative: &Array2<T>,
 ) -> Result<f64, Error> {
-    let (what, order) = ("covariance", covariance.nrows());
+    let what = "covariance";
+    let order = covariance.nrows();
     length(what, order, covariance.ncols())?;
-    let difference =
-        |((i, j), value): ((usize, usize), &T)| (*value - covariance[[j, i]].conj()).abs();
-    let value = covariance
-        .indexed_iter()
-        .map(difference)
-        .fold(0.0, f64::max);
-    let rounding = 1e-10
-        * covariance
-            .iter()
-            .map(|value| value.abs())
-            .fold(0.0, f64::max);
+    let mut asymmetry: f64 = 0.0;
+    let mut largest: f64 = 0.0;
+    for ((i, j), value) in covariance.indexed_iter() {
+        asymmetry = asymmetry.max((*value - covariance[[j, i]].conj()).abs());
+        largest = largest.max(value.abs());
+    }
     check(
         "covariance minus its adjoint",
-        value,
+        asymmetry,
         "0 up to rounding",
-        value <= rounding,
+        asymmetry <= 1e-10 * largest,
     )?;
     let least = LEAST_CONDITION * order as f64;
-    let refused = |reciprocal_condition| Error::IllConditioned {
-        what,
-        order,
-        reciprocal_condition,
-        least,
-    };
     // in its eigenvectors the inverse is a division by each eigenvalue
     let (values, vectors) = hermitian_eigen(what, covariance.view())?;
     let reciprocal_condition = (values[0] / values[order - 1]).max(0.0);
     if reciprocal_condition < least {
-        return Err(refused(reciprocal_condition));
+        return Err(Error::IllConditioned {
+            what,
+            order,
+            reciprocal_condition,
+            least,
+        });
     }
     length("derivative", order, derivative.nrows())?;
     length("derivative", order, derivative.ncols())?;
     let adjoint = vectors.t().mapv(|value| value.conj());
     let turned = adjoint.dot(derivative).dot(&vectors);
-    let of_pair = |((n, m), value): ((usize, usize), &T)| {
-        (*value * turned[[m, n]]).re() / (values[n] * values[m])
-    };
-    Ok(turned.indexed_iter().map(of_pair).sum())
+    let mut sum = 0.0;
+    for ((n, m), value) in turned.indexed_iter() {
+        sum += (*value * turned[[m, n]]).re() / (values[n] * values[m]);
+    }
+    Ok(sum)
 }
 
-/// `bound` with the noise as it is; where its floor makes the covariance singular, says which floor would do.
+/// `bound` with the given noise; where its floor makes the covariance singular, the error names a floor that is large enough.
 ///
 /// The smallest eigenvalue of the covariance is the floor's, so that the condition is proportional to it.
 fn with_floor_named(
     noise: Noise,
     window_samples: usize,
-    bound: impl Fn(Noise) -> Result<f64, Error>,
+    bound: &dyn Fn(Noise) -> Result<f64, Error>,
 ) -> Result<f64, Error> {
     let found = bound(noise);
-    let (
-        Noise::Band { floor },
-        Err(Error::IllConditioned {
-            reciprocal_condition,
-            least,
-            ..
-        }),
-    ) = (noise, &found)
+    let Noise::Band { floor } = noise else {
+        return found;
+    };
+    let Err(Error::IllConditioned {
+        reciprocal_condition,
+        least,
+        ..
+    }) = found
     else {
         return found;
     };
@@ -126,7 +123,6 @@ fn with_floor_named(
         let printed = format!("{rounded:.1e}").parse().unwrap_or(rounded);
         match bound(Noise::Band { floor: printed }) {
             Ok(_) => {
-                let reciprocal_condition = *reciprocal_condition;
                 return Err(Error::NoiseFloor {
                     floor,
                     window_samples,
@@ -185,10 +181,8 @@ impl Noise {
         lag: f64,
         kind: SignalKind,
     ) -> Complex<f64> {
-        let (low, high) = (
-            sampling.band_hz.0 / sampling.sample_rate_hz,
-            sampling.band_hz.1 / sampling.sample_rate_hz,
-        );
+        let low = sampling.band_hz.0 / sampling.sample_rate_hz;
+        let high = sampling.band_hz.1 / sampling.sample_rate_hz;
         let white = if lag == 0.0 {
             kind.one_sided_share()
         } else {
@@ -227,11 +221,15 @@ impl Noise {
         sampling.validate_for(kind)?;
         positive("power", power)?;
         let unit = power * sampling.sample_rate_hz / (sampling.band_hz.1 - sampling.band_hz.0);
-        let lags = lag_weights.iter().enumerate().flat_map(|(m, weight)| {
+        let mut numbers = Vec::with_capacity(kind.lag_numbers(lag_weights.len()));
+        for (m, weight) in lag_weights.iter().enumerate() {
             let lag = self.covariance(sampling, m as f64, kind) * (unit * weight);
-            [lag.re, lag.im].into_iter().take(kind.lag_numbers(1))
-        });
-        Ok(lags.collect())
+            numbers.push(lag.re);
+            if kind == SignalKind::Complex {
+                numbers.push(lag.im);
+            }
+        }
+        Ok(numbers)
     }
 }
 
@@ -382,20 +380,32 @@ impl WindowModel {
         kind: SignalKind,
         windows: f64,
     ) -> Result<f64, Error> {
-        with_floor_named(self.noise, self.envelope.nrows(), |noise| {
-            let [covariance, derivative] = Self {
+        with_floor_named(self.noise, self.envelope.nrows(), &|noise| {
+            let model = Self {
                 noise,
                 ..self.clone()
-            }
-            .covariance(velocity_m_s, snr, kind)?;
+            };
+            let [covariance, derivative] = model.covariance(velocity_m_s, snr, kind)?;
             let found = bound_m_s(kind, &covariance, &derivative, windows);
-            let (Err(Error::IllConditioned { .. }), Noise::Band { floor }, Some(sigma_s)) =
-                (&found, noise, self.gaussian_sigma_s)
-            else {
+            let Err(Error::IllConditioned { .. }) = found else {
                 return found;
             };
-            let window = (&self.sampling, self.envelope.nrows(), sigma_s);
-            match extended::information(window, floor, velocity_m_s, snr, kind) {
+            let Noise::Band { floor } = noise else {
+                return found;
+            };
+            let Some(sigma_s) = self.gaussian_sigma_s else {
+                return found;
+            };
+            let window = GaussianWindow {
+                sampling: &self.sampling,
+                samples: self.envelope.nrows(),
+                sigma_s,
+                floor,
+                velocity_m_s,
+                snr,
+                kind,
+            };
+            match window.information() {
                 Some(information) => {
                     from_information(kind.one_sided_share() * information, windows)
                 }

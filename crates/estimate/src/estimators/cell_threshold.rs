@@ -15,7 +15,9 @@ use crate::estimators::tails::gamma_tail;
 pub fn cell_threshold(windows: f64, false_alarm: f64) -> Result<f64, Error> {
     positive("windows", windows)?;
     probability("false_alarm", false_alarm)?;
-    let (mut low, mut high) = (-700.0_f64, 700.0_f64);
+    // logarithms of the threshold
+    let mut low = -700.0_f64;
+    let mut high = 700.0_f64;
     while high - low > 1e-15 * high.abs().max(1.0) {
         let middle = 0.5 * (low + high);
         if middle <= low || middle >= high {

@@ -44,20 +44,22 @@ use crate::window::{Gates, Sampling, SignalKind};
 
 type C64 = Complex<f64>;
 
-/// Samples by which the lags of a window are described; of more every second, third or further one is taken.
+/// Most samples that describe the lags of a window; longer windows are thinned to every Nth sample.
 const SAMPLES: usize = 40;
 
-/// Parts of half the band in which the density of the noise is one.
+/// Number of parts of half the band; within each the density of the noise is taken as constant.
 const PARTS: usize = 12;
 
-/// The test of a spectrum against noise: what noise looks like in it.
+/// The test of a spectrum against noise: mean, deviation and gradient of the density of noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseTest {
     /// Variance of the mean over the band of the density of one window.
     band_variance: f64,
-    /// Width of the band, and of the part of it whose peaks are not flagged, in cycles per sample.
-    band: (f64, f64),
-    /// Frequencies over 0 .. F_s at which the density is looked at.
+    /// Width of the band in cycles per sample.
+    band_width: f64,
+    /// Width of the part of the band whose peaks are not flagged, in cycles per sample.
+    unflagged_width: f64,
+    /// Number of frequencies over 0 .. F_s at which the density is computed.
     padded: f64,
     /// For increasing numbers of windows in a row the traces of the powers 2, 3 and 4 of CA, and half of that of (CA')^2.
     moments: Vec<(usize, [f64; 4])>,
@@ -65,14 +67,16 @@ pub struct NoiseTest {
     profile: Vec<(f64, f64)>,
 }
 
-/// What noise looks like in the density of a region, its mean being 1.
+/// Distribution of the density of noise in a region, relative to its mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegionNoise {
-    /// Independent windows that the region is worth; 0 without windows.
+    /// Effective number of independent windows; 0 without windows.
     pub n_eff: f64,
-    /// Shape of the gamma variable, what it is multiplied with, and w in radians per cycle per sample.
+    /// Shape a of the gamma variable.
     shape: f64,
+    /// Scale theta of the gamma variable.
     scale: f64,
+    /// w in radians per cycle per sample.
     gradient: f64,
 }
 
@@ -85,8 +89,8 @@ impl RegionNoise {
 }
 
 impl NoiseTest {
-    /// For the spectrum of a correlogram of those tapers, times `lag_weights` from lag 0 on (none: all lags as they are),
-    /// whose peak is sought among `padded_samples` frequencies over 0 .. F_s, in that noise.
+    /// Plans the test for the spectrum of a correlogram of `tapers`, times `lag_weights` from lag 0 on (none: all lags unweighted),
+    /// whose peak is searched among `padded_samples` frequencies over 0 .. F_s, in `noise`.
     ///
     /// # Errors
     /// [`Error::Empty`] without tapers or with no weight, [`Error::Length`] for tapers of different lengths, [`Error::OutOfRange`] for impossible
@@ -99,75 +103,61 @@ impl NoiseTest {
         padded_samples: usize,
         noise: Noise,
     ) -> Result<Self, Error> {
-        let scaled = |taper: &Taper| {
-            let root = taper.factor.abs().sqrt();
-            taper
-                .weights
-                .iter()
-                .map(|h| Complex::from(h * root))
-                .collect()
-        };
-        let tapers: Vec<Vec<C64>> = tapers.iter().map(scaled).collect();
+        let tapers: Vec<Vec<C64>> = tapers.iter().map(scaled_weights).collect();
         let samples = tapers.first().map_or(0, Vec::len);
         gates.validate()?;
         not_empty("tapers", samples)?;
-        tapers
-            .iter()
-            .try_for_each(|taper| length("tapers", samples, taper.len()))?;
+        for taper in &tapers {
+            length("tapers", samples, taper.len())?;
+        }
         not_empty("lag_weights", lag_weights.map_or(samples, <[f64]>::len))?;
         let bins = Band::new(sampling, SignalKind::Complex, padded_samples)?;
-        let (padded, band) = (
-            padded_samples as f64,
-            (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz,
-        );
-        let within = if bins.cyclic {
+        let padded = padded_samples as f64;
+        let band_width = (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz;
+        let unflagged_width = if bins.cyclic {
             1.0
         } else {
             bins.bins.saturating_sub(2) as f64 / padded
         };
         let form = Form::new(sampling, &tapers, lag_weights, noise)?;
-        let (mean, deviation) = form.seen(0.0);
+        let (mean, deviation) = form.density_moments(0.0);
         positive("power of the weights of the lags", deviation)?;
-        let part = |part: usize| {
-            let (own_mean, own_deviation) =
-                form.seen(0.5 * band * (part as f64 + 0.5) / PARTS as f64);
-            (own_mean / mean, own_deviation / deviation)
-        };
-        // Windows see noise of their own where they are so far apart that even noise of the band alone has forgotten: sinc(20)^2 is below
-        // 3e-4. Beyond that a wider step changes nothing but the size of the covariance.
-        let forgotten = (20.0 / band).min(8.0 * samples as f64) as usize;
-        let step = gates.step_samples.min(samples + forgotten.max(samples));
-        let rows = lengths(2 * samples / gates.step_samples + 2).into_iter();
-        let in_band = form.matrix.indexed_iter().map(|((i, j), q)| {
-            let turn = PI * band * (i.abs_diff(j) * form.every) as f64;
-            q.norm_sqr()
-                * if i == j {
-                    1.0
-                } else {
-                    (turn.sin() / turn).powi(2)
-                }
-        });
-        let power: f64 = form.matrix.diag().iter().map(|q| q.re).sum();
+        let mut profile = Vec::with_capacity(PARTS);
+        for part in 0..PARTS {
+            let offset = 0.5 * band_width * (part as f64 + 0.5) / PARTS as f64;
+            let (part_mean, part_deviation) = form.density_moments(offset);
+            profile.push((part_mean / mean, part_deviation / deviation));
+        }
+        // The noise of two windows is independent where they are so far apart that even band-limited noise is uncorrelated:
+        // sinc(20)^2 is below 3e-4. Beyond that a wider step changes nothing but the size of the covariance.
+        let correlation_samples = (20.0 / band_width).min(8.0 * samples as f64) as usize;
+        let step = gates
+            .step_samples
+            .min(samples + correlation_samples.max(samples));
+        let mut moments = Vec::new();
+        for row_gates in row_lengths(2 * samples / gates.step_samples + 2) {
+            moments.push((row_gates, form.moments(row_gates, step, mean)));
+        }
         Ok(Self {
-            band_variance: in_band.sum::<f64>() / (power * power * form.shorter as f64),
-            band: (band, within),
+            band_variance: form.band_variance(band_width),
+            band_width,
+            unflagged_width,
             padded,
-            moments: rows
-                .map(|gates| (gates, form.moments(gates, step, mean)))
-                .collect(),
-            profile: (0..PARTS).map(part).collect(),
+            moments,
+            profile,
         })
     }
 
-    /// What noise looks like in a region of that many windows in a row, each in so many pulses.
+    /// Distribution of noise in a region: for each chord its number of windows in a row and of pulses.
     #[must_use]
     pub fn region(&self, chords: impl Iterator<Item = (usize, usize)>) -> RegionNoise {
-        let (mut level, mut sums) = (0.0, [0.0; 4]);
+        let mut level = 0.0;
+        let mut sums = [0.0; 4];
         for (gates, pulses) in chords {
             level += (pulses * gates) as f64;
-            sums.iter_mut()
-                .zip(self.row(gates))
-                .for_each(|(sum, moment)| *sum += pulses as f64 * moment);
+            for (sum, moment) in sums.iter_mut().zip(self.row(gates)) {
+                *sum += pulses as f64 * moment;
+            }
         }
         if level == 0.0 {
             return RegionNoise {
@@ -188,7 +178,7 @@ impl NoiseTest {
         }
     }
 
-    /// The same in the region of that radius about a point of a scan, all of whose samples are valid.
+    /// Distribution of noise in the region of radius `radius_m` about a point of a scan, all of whose samples are valid.
     #[must_use]
     pub fn region_at(
         &self,
@@ -203,17 +193,24 @@ impl NoiseTest {
         )
     }
 
-    /// The moments of that many windows in a row: powers of their number at first, linear in it once rows are longer than a window.
+    /// The moments of `gates` windows in a row, interpolated as powers of their number at first, linearly once rows are longer than a
+    /// window.
     fn row(&self, gates: usize) -> [f64; 4] {
         let above = self
             .moments
             .partition_point(|(at, _)| *at < gates)
             .clamp(1, self.moments.len() - 1);
-        let ((low, a), (high, b)) = (&self.moments[above - 1], &self.moments[above]);
-        let (at, low, high) = (gates as f64, *low as f64, *high as f64);
-        [0, 1, 2, 3].map(|k| match at > high {
-            true => a[k] + (b[k] - a[k]) * (at - low) / (high - low),
-            false => a[k] * (b[k] / a[k]).powf((at / low).ln() / (high / low).ln()),
+        let (low_gates, a) = &self.moments[above - 1];
+        let (high_gates, b) = &self.moments[above];
+        let low = *low_gates as f64;
+        let high = *high_gates as f64;
+        let at = gates as f64;
+        std::array::from_fn(|k| {
+            if at > high {
+                a[k] + (b[k] - a[k]) * (at - low) / (high - low)
+            } else {
+                a[k] * (b[k] / a[k]).powf((at / low).ln() / (high / low).ln())
+            }
         })
     }
 
@@ -232,33 +229,37 @@ impl NoiseTest {
             gradient,
             ..
         } = *region;
-        let of_part = |(mean, deviation): &(f64, f64)| 1.0 + (level - mean) / deviation;
-        let sums: Vec<f64> = self
-            .profile
-            .iter()
-            .map(|part| (of_part(part) - 1.0 + scale * shape) / scale)
-            .collect();
+        let mut excesses = [0.0; PARTS];
+        let mut sums = [0.0; PARTS];
+        for (part, (mean, deviation)) in self.profile.iter().enumerate() {
+            excesses[part] = 1.0 + (level - mean) / deviation - 1.0;
+            sums[part] = (excesses[part] + scale * shape) / scale;
+        }
         // below the mean it is always above
         if level <= 1.0 || sums.iter().any(|sum| *sum <= 0.0) {
             return 1.0;
         }
-        let rate = |part: usize| {
-            let (sum, excess) = (sums[part], of_part(&self.profile[part]) - 1.0);
-            let (before, after) = (part.saturating_sub(1), (part + 1).min(PARTS - 1));
+        let mut rates = 0.0;
+        for part in 0..PARTS {
+            let sum = sums[part];
+            let before = part.saturating_sub(1);
+            let after = (part + 1).min(PARTS - 1);
             let slope = (sums[after] - sums[before]).abs()
-                / ((after - before) as f64 * 0.5 * self.band.0 / PARTS as f64);
+                / ((after - before) as f64 * 0.5 * self.band_width / PARTS as f64);
             let spread = (2.0 * sum).sqrt() * gradient;
             let steepness = (1.0 - (shape - 1.0) / sum).max(0.0) / scale;
-            let half_step = (0.5 * gradient / self.padded * (excess * steepness).sqrt()).max(1e-3);
-            let seen = 0.5 * PI.sqrt() * erf(half_step) / half_step;
-            let level_off = seen * spread / TAU.sqrt() * (-0.5 * (slope / spread).powi(2)).exp();
+            let half_step =
+                (0.5 * gradient / self.padded * (excesses[part] * steepness).sqrt()).max(1e-3);
+            let found_fraction = 0.5 * PI.sqrt() * erf(half_step) / half_step;
+            let level_off =
+                found_fraction * spread / TAU.sqrt() * (-0.5 * (slope / spread).powi(2)).exp();
             let across = 0.5 * slope * erf(FRAC_1_SQRT_2 * slope / spread);
             let crossings =
                 ((shape - 1.0) * sum.ln() - sum - ln_gamma(shape)).exp() * (level_off + across);
-            // no more chances than frequencies looked at
-            crossings.min(-self.padded * (-gamma_tail(shape, sum)).ln_1p())
-        };
-        1.0 - (-self.band.1 * (0..PARTS).map(rate).sum::<f64>() / PARTS as f64).exp()
+            // the rate is at most that of independent frequencies
+            rates += crossings.min(-self.padded * (-gamma_tail(shape, sum)).ln_1p());
+        }
+        1.0 - (-self.unflagged_width * rates / PARTS as f64).exp()
     }
 
     /// Peak over the density of the noise that noise alone exceeds in a region with probability `rate`; NaN without windows.
@@ -267,9 +268,11 @@ impl NoiseTest {
     /// [`Error::OutOfRange`] unless `rate` is between 0 and 1.
     pub fn threshold(&self, region: &RegionNoise, rate: f64) -> Result<f64, Error> {
         probability("false_alarm", rate)?;
-        let (mut low, mut high) = (0.0, 2.0);
+        let mut low = 0.0;
+        let mut high = 2.0;
         while self.false_alarm(region, high) > rate && high < f64::MAX {
-            (low, high) = (high, 2.0 * high);
+            low = high;
+            high *= 2.0;
         }
         let [low, high] = bisected(low, high, 60, |level| {
             self.false_alarm(region, level) > rate
@@ -282,18 +285,20 @@ impl NoiseTest {
     }
 }
 
-/// The quadratic form A of one window, in every so many of its samples, and the noise it looks at.
+/// The quadratic form A of one window, thinned to every Nth sample, and the noise that it is applied to.
 struct Form<'a> {
     matrix: Array2<C64>,
-    /// Every so many samples stand for all. Where the lags reach not far, a shorter window of like tapers, too: so many times less independent.
+    /// Stride of the samples that represent all.
     every: usize,
+    /// Length of the window over that of the shorter window with similar tapers that represents it where only short lags count; the
+    /// density of the shorter window has so many times the variance.
     shorter: usize,
     sampling: &'a Sampling,
     noise: Noise,
 }
 
 impl<'a> Form<'a> {
-    /// Of tapers of one length that is not 0.
+    /// The form of tapers of one length that is not 0.
     fn new(
         sampling: &'a Sampling,
         tapers: &[Vec<C64>],
@@ -312,8 +317,11 @@ impl<'a> Form<'a> {
             } else {
                 0.0
             };
-            let product = |h: &Vec<C64>| h[i * every * shorter] * h[j * every * shorter].conj();
-            tapers.iter().map(product).sum::<C64>() * weight
+            let mut products = C64::ZERO;
+            for h in tapers {
+                products += h[i * every * shorter] * h[j * every * shorter].conj();
+            }
+            products * weight
         });
         positive(
             "power of the tapers",
@@ -328,7 +336,23 @@ impl<'a> Form<'a> {
         })
     }
 
-    /// Covariance C of the noise in `size` places, as it is `offset` cycles per sample from the middle of the band.
+    /// Variance of the mean over the band, `band_width` cycles per sample wide, of the density of one window in white noise.
+    fn band_variance(&self, band_width: f64) -> f64 {
+        let mut sum = 0.0;
+        for ((i, j), q) in self.matrix.indexed_iter() {
+            let turn = PI * band_width * (i.abs_diff(j) * self.every) as f64;
+            let mean_square = if i == j {
+                1.0
+            } else {
+                (turn.sin() / turn).powi(2)
+            };
+            sum += q.norm_sqr() * mean_square;
+        }
+        let power: f64 = self.matrix.diag().iter().map(|q| q.re).sum();
+        sum / (power * power * self.shorter as f64)
+    }
+
+    /// Covariance C of the noise at `size` samples, `offset` cycles per sample from the middle of the band.
     fn covariance(&self, size: usize, offset: f64) -> Array2<C64> {
         let Self {
             every,
@@ -343,16 +367,18 @@ impl<'a> Form<'a> {
             Noise::Band { floor } if band * (every as f64) < 1.0 => floor,
             _ => 1.0,
         };
-        let lag = |lag: usize| {
-            let own = if lag == 0 { white } else { 0.0 };
+        let mut lags: Vec<C64> = Vec::with_capacity(size);
+        for index in 0..size {
+            let own = if index == 0 { white } else { 0.0 };
             if white >= 1.0 {
-                return Complex::from(own);
+                lags.push(Complex::from(own));
+                continue;
             }
-            let apart = (lag * every) as f64;
-            let within = noise.covariance(sampling, apart, SignalKind::Complex) - own;
-            within * every as f64 * Complex::from_polar(1.0, -TAU * (middle + offset) * apart) + own
-        };
-        let lags: Vec<C64> = (0..size).map(lag).collect();
+            let lag = (index * every) as f64;
+            let within = noise.covariance(sampling, lag, SignalKind::Complex) - own;
+            let carrier = Complex::from_polar(1.0, -TAU * (middle + offset) * lag);
+            lags.push(within * every as f64 * carrier + own);
+        }
         Array2::from_shape_fn((size, size), |(i, j)| {
             if i >= j {
                 lags[i - j]
@@ -362,8 +388,8 @@ impl<'a> Form<'a> {
         })
     }
 
-    /// Mean tr CA and deviation of the density of one window so far from the middle of the band.
-    fn seen(&self, offset: f64) -> (f64, f64) {
+    /// Mean tr CA and standard deviation of the density of one window, `offset` cycles per sample from the middle of the band.
+    fn density_moments(&self, offset: f64) -> (f64, f64) {
         let product = self
             .covariance(self.matrix.nrows(), offset)
             .dot(&self.matrix);
@@ -373,25 +399,31 @@ impl<'a> Form<'a> {
         )
     }
 
-    /// The traces of [`NoiseTest`] for that many windows in a row, `step` samples apart, where a window has the mean `mean`.
+    /// The traces of [`NoiseTest`] for `gates` windows in a row, `step` samples apart, each with the mean density `mean`.
     fn moments(&self, gates: usize, step: usize, mean: f64) -> [f64; 4] {
-        let (size, every) = (self.matrix.nrows(), self.every);
-        let start =
-            |gate: usize| ((gate * step) as f64 / (every * self.shorter) as f64).round() as usize;
-        let length = size + start(gates - 1);
+        let size = self.matrix.nrows();
+        let every = self.every;
+        let stride = (every * self.shorter) as f64;
+        let last = (((gates - 1) * step) as f64 / stride).round() as usize;
+        let length = size + last;
         let mut sum = Array2::<C64>::zeros((length, length));
-        for at in (0..gates).map(start) {
-            let mut part = sum.slice_mut(ndarray::s![at..at + size, at..at + size]);
+        for gate in 0..gates {
+            let start = ((gate * step) as f64 / stride).round() as usize;
+            let end = start + size;
+            let mut part = sum.slice_mut(ndarray::s![start..end, start..end]);
             part += &self.matrix;
         }
         let turned = Array2::from_shape_fn((length, length), |(i, j)| {
             sum[[i, j]] * Complex::new(0.0, TAU * every as f64 * (i as f64 - j as f64))
         });
         let covariance = self.covariance(length, 0.0);
-        let (once, turned) = (covariance.dot(&sum), covariance.dot(&turned));
+        let once = covariance.dot(&sum);
+        let turned = covariance.dot(&turned);
         let twice = once.dot(&once);
-        let (unit, less) = (mean.recip(), self.shorter as f64);
-        let [second, third] = [unit * unit / less, (unit / less).powi(2) * unit];
+        let unit = mean.recip();
+        let less = self.shorter as f64;
+        let second = unit * unit / less;
+        let third = (unit / less).powi(2) * unit;
         [
             trace(&once, &once) * second,
             trace(&twice, &once) * third,
@@ -406,10 +438,25 @@ fn trace(a: &Array2<C64>, b: &Array2<C64>) -> f64 {
     a.iter().zip(b.t()).map(|(a, b)| (a * b).re).sum()
 }
 
-/// Numbers of windows in a row up to `most`, each some third more than the one before.
-fn lengths(most: usize) -> Vec<usize> {
-    let next = |at: &usize| Some((at + 1).max(4 * at / 3)).filter(|next| *next <= most);
-    std::iter::successors(Some(1), next).collect()
+/// The weights of a taper times the root of its factor.
+fn scaled_weights(taper: &Taper) -> Vec<C64> {
+    let root = taper.factor.abs().sqrt();
+    taper
+        .weights
+        .iter()
+        .map(|h| Complex::from(h * root))
+        .collect()
+}
+
+/// Numbers of windows in a row up to `most`, each about a third larger than the one before.
+fn row_lengths(most: usize) -> Vec<usize> {
+    let mut lengths = vec![1];
+    let mut next = 2;
+    while next <= most {
+        lengths.push(next);
+        next = (next + 1).max(4 * next / 3);
+    }
+    lengths
 }
 
 #[cfg(test)]
@@ -479,7 +526,8 @@ mod tests {
             // frequencies so far apart that each is a chance of its own
             let few = NoiseTest {
                 padded: 5.0,
-                band: (1.0, 1.0),
+                band_width: 1.0,
+                unflagged_width: 1.0,
                 ..test.clone()
             };
             let expected = 1.0 - (1.0 - single).powi(5);

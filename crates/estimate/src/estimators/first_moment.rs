@@ -118,15 +118,16 @@ fn moments(density: &[f64], centre: f64, half: f64, floor: f64) -> Option<(f64, 
         .max(1.0);
     let first = (centre - half).ceil().max(0.0) as usize;
     let last = ((centre + half).floor() as usize).min(density.len() - 1);
-    let sums = (first..=last).fold([0.0; 3], |[sum, once, twice], k| {
-        let (excess, place) = (density[k] - floor, k as f64 - centre);
-        [
-            sum + excess,
-            once + excess * place,
-            twice + excess * place * place,
-        ]
-    });
-    let [sum, once, twice] = sums;
+    let mut sum = 0.0;
+    let mut once = 0.0;
+    let mut twice = 0.0;
+    for (k, density) in density.iter().enumerate().take(last + 1).skip(first) {
+        let excess = density - floor;
+        let distance = k as f64 - centre;
+        sum += excess;
+        once += excess * distance;
+        twice += excess * distance * distance;
+    }
     let mean = once / sum;
     (sum > 0.0 && mean.abs() <= half).then(|| (centre + mean, twice / sum - mean * mean))
 }

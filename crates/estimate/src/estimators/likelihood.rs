@@ -11,7 +11,7 @@ use crate::error::{Error, positive};
 use crate::linalg::hermitian_eigen;
 use crate::spectrum::Taper;
 
-/// Tapers with less than this share of the largest weight are left out.
+/// Tapers with less than this fraction of the largest weight are skipped.
 const LEAST_WEIGHT: f64 = 1e-3;
 
 /// Tapers of the likelihood of velocity for windows like `model` at signal-to-noise ratio `snr` (in the detector band).
@@ -30,19 +30,22 @@ pub fn likelihood_tapers(model: &WindowModel, snr: f64) -> Result<Vec<Taper>, Er
     let envelope = model.envelope();
     let power = envelope.diag().mean().unwrap_or(1.0);
     let (values, vectors) = hermitian_eigen("envelope", envelope.view())?;
-    let weight = |value: f64| (value / (value + noise_to_signal * power)).max(0.0);
-    let largest = weight(values[values.len() - 1]);
-    let kept: Vec<usize> = (0..values.len())
-        .rev()
-        .filter(|&k| weight(values[k]) > LEAST_WEIGHT * largest)
-        .collect();
-    let sum: f64 = kept.iter().map(|&k| weight(values[k])).sum();
+    let weights = values.mapv(|value| (value / (value + noise_to_signal * power)).max(0.0));
+    let largest = weights[weights.len() - 1];
+    let mut tapers = Vec::new();
+    let mut sum = 0.0;
+    for (k, &weight) in weights.iter().enumerate().rev() {
+        if weight > LEAST_WEIGHT * largest {
+            sum += weight;
+            tapers.push(Taper {
+                weights: vectors.column(k).to_vec(),
+                factor: weight,
+            });
+        }
+    }
     positive("sum of the weights of the tapers", sum)?;
-    Ok(kept
-        .iter()
-        .map(|&k| Taper {
-            weights: vectors.column(k).to_vec(),
-            factor: weight(values[k]) / sum,
-        })
-        .collect())
+    for taper in &mut tapers {
+        taper.factor /= sum;
+    }
+    Ok(tapers)
 }

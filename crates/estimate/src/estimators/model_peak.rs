@@ -72,9 +72,10 @@ impl ModelPeak {
         }
         // a pole on the circle to rounding must not turn the density negative or infinite
         let least = f64::MIN_POSITIVE.max(1e-300 / model.noise_power);
-        band.iter_mut()
-            .for_each(|value| *value = value.max(least).recip());
-        let found = self.search.locate(band, self.refinement, &[], || None);
+        for value in band.iter_mut() {
+            *value = value.max(least).recip();
+        }
+        let found = self.search.locate(band, self.refinement, &[], &mut || None);
         self.search.velocity(&found)
     }
 }
@@ -95,8 +96,8 @@ impl Estimator for ModelPeak {
             Ok(()) => self.read(&model, &mut numbers, &mut scratch.band),
             Err(_) => GateVelocity::none(Quality::Invalid),
         };
-        // The density of a model is not linear in the correlogram: power and detection are those of its lags, which also tell what
-        // lines outside leak. How wide a spectrum is a model does not show: its peaks narrow with the signal-to-noise ratio.
+        // The density of a model is not linear in the correlogram: power and detection are those of its lags, which also determine the
+        // leakage of lines outside. A model does not resolve the width of a spectrum: its peaks narrow with the signal-to-noise ratio.
         numbers.clear();
         numbers.extend(kind.weighted_lags(mean, &self.lag_weights));
         if let Some(found) = self.search.find(&numbers, Refinement::None, scratch) {
@@ -107,10 +108,12 @@ impl Estimator for ModelPeak {
                 (Quality::Good, flag) => estimate.flag = flag,
                 _ => {}
             }
-            (estimate.power, estimate.detection) = (self.search.power(found.sum), found.peak);
+            estimate.power = self.search.power(found.sum);
+            estimate.detection = found.peak;
             estimate.spread_m2_s2 = f64::NAN;
         }
-        (scratch.model, scratch.numbers) = (model, numbers);
+        scratch.model = model;
+        scratch.numbers = numbers;
         estimate
     }
 }

@@ -36,8 +36,10 @@ impl PulsePair {
             Refinement::None,
         )?;
         let rad_per_hz = std::f64::consts::TAU * sampling.period_s();
-        let phasor = |f_hz: f64| Complex::from_polar(1.0, rad_per_hz * f_hz);
-        let phasors = band.band_frequencies_hz().into_iter().map(phasor).collect();
+        let mut phasors = Vec::new();
+        for f_hz in band.band_frequencies_hz() {
+            phasors.push(Complex::from_polar(1.0, rad_per_hz * f_hz));
+        }
         Ok(Self { band, phasors })
     }
 }

@@ -1,6 +1,6 @@
-//! Search of a density for its peak inside the detector band, and what the peak tells: width, SNR, flag.
+//! Search of a density for its peak inside the detector band, and properties of the peak: width, SNR, flag.
 //!
-//! Works on the densities of the band alone, whatever made them. Check: a tone returns its velocity; zero, constant and
+//! Works on the densities of the band alone, whatever their source. Check: a tone returns its velocity; zero, constant and
 //! out-of-band signals are flagged; width and SNR of simulated wind (in the tests of the estimators).
 
 use num_complex::Complex;
@@ -12,22 +12,22 @@ use crate::spectrum::lag_spectrum::Band;
 use crate::spectrum::{LagSpectrum, ZoomSpectrum};
 use crate::window::{Sampling, Scratch, SignalKind};
 
-/// Most that noise raises what a line outside leaks into the band, in amplitudes of that.
+/// Largest factor by which noise raises the amplitude that a line outside leaks into the band.
 const RAISED: f64 = 1.5;
 
 /// Widths of spectra for which that of the peak is known, from 0 to 9 times that of a line.
 const WIDTHS: usize = 13;
 
-/// As many of them reach the width of a line.
+/// Number of them up to the width of a line.
 const LEAST_WIDTHS: usize = 5;
 
-/// Share of the square of a spectrum's width in that of its peak below which the peak does not show it.
+/// Increase of the squared width of a peak over that of its spectrum below which the peak does not determine the spectrum.
 const LEAST_SHARE: f64 = 0.25;
 
 /// Full width at half maximum of a Gaussian over its standard deviation: 2 sqrt(2 ln 2).
 pub(crate) const FULL_WIDTH: f64 = 2.354_820_045_030_949;
 
-/// Share of the highest density in the lowest below which there is no noise beneath a peak that fills the band.
+/// Lowest over highest density below which there is no noise beneath a peak that fills the band.
 const BARE: f64 = 0.02;
 
 /// Full widths of the peak that the bins beside it must hold for its width to be measured above
@@ -66,10 +66,11 @@ pub(crate) struct PeakSearch {
     whole: LagSpectrum,
     /// A line closer to 0 Hz than this \[cycles per sample\] counts as a constant.
     constant: f64,
-    /// Squares of the standard deviations of peak and spectrum \[bins^2\], from that of a line on; empty where the peak does not
-    /// show how wide its spectrum is.
+    /// Squares of the standard deviations of peak and spectrum \[bins^2\], from that of a line on; empty where the width of the peak does
+    /// not determine that of its spectrum.
     widths: Vec<(f64, f64)>,
-    /// Highest density that a line has so many parts of a turn from its place and beyond, over that of its peak.
+    /// Highest density of a line at a distance from its frequency and beyond, over that of its peak; distances up to half a cycle per
+    /// sample, equally spaced.
     leak: Vec<f64>,
 }
 
@@ -88,7 +89,7 @@ pub(crate) struct Located {
 }
 
 impl PeakSearch {
-    /// For the spectrum of correlograms whose lags have those weights, sought among `padded` frequencies over 0 .. F_s.
+    /// Plans the search for the spectrum of correlograms with `lag_weights`, among `padded` frequencies over 0 .. F_s.
     pub(crate) fn new(
         sampling: &Sampling,
         kind: SignalKind,
@@ -106,10 +107,9 @@ impl PeakSearch {
             .iter()
             .map(|density| (density / line[0]).abs())
             .collect();
-        for place in (1..leak.len()).rev() {
-            leak[place - 1] = leak[place - 1].max(leak[place]);
+        for index in (1..leak.len()).rev() {
+            leak[index - 1] = leak[index - 1].max(leak[index]);
         }
-        let (constant, widths) = (1.0 / lags as f64, widths(lag_weights, padded, band.bins)?);
         Ok(Self {
             sampling: *sampling,
             band,
@@ -117,8 +117,8 @@ impl PeakSearch {
             padded,
             zoom,
             whole,
-            constant,
-            widths,
+            constant: 1.0 / lags as f64,
+            widths: widths(lag_weights, padded, band.bins)?,
             leak,
         })
     }
@@ -137,11 +137,10 @@ impl PeakSearch {
     ) -> Option<Located> {
         let mut band = std::mem::take(&mut scratch.band);
         self.zoom.density_into(lags, &mut band).ok()?;
-        let found = self.locate(&band, refinement, lags, || {
+        let found = self.locate(&band, refinement, lags, &mut || {
             let density = self.whole.density(lags, scratch).ok()?;
-            let (place, highest) = highest(density);
-            let place = place as f64 / density.len() as f64;
-            Some((highest, place))
+            let (bin, highest) = highest(density);
+            Some((highest, bin as f64 / density.len() as f64))
         });
         scratch.band = band;
         Some(found)
@@ -149,14 +148,14 @@ impl PeakSearch {
 
     /// Highest density in the band, by bin or by parabola through its logarithm.
     ///
-    /// `density` holds the bins of the band and one neighbour on each side, and is that of `lags`; `anywhere` is asked for the highest
-    /// density at any frequency where it matters. Without lags it never does.
+    /// `density` holds the bins of the band and one neighbour on each side, and is that of `lags`; `anywhere` returns the highest
+    /// density at any frequency, and that frequency in cycles per sample. It is called where it matters: never without lags.
     pub(crate) fn locate(
         &self,
         density: &[f64],
         refinement: Refinement,
         lags: &[f64],
-        anywhere: impl FnOnce() -> Option<(f64, f64)>,
+        anywhere: &mut dyn FnMut() -> Option<(f64, f64)>,
     ) -> Located {
         let inside = &density[1..=self.band.bins];
         let (top, peak) = highest(inside);
@@ -226,33 +225,36 @@ impl PeakSearch {
         sides * sum / self.padded as f64
     }
 
-    /// Variance \[bins^2\] of the Gaussian spectrum whose peak has the variance `seen`; below 0 for a peak narrower than that of a line,
-    /// NaN where peaks do not show it.
-    fn spread(&self, seen: f64) -> f64 {
-        let above = self.widths.partition_point(|(at, _)| *at < seen).max(1);
+    /// Variance \[bins^2\] of the Gaussian spectrum whose peak has the variance `of_peak`; below 0 for a peak narrower than that of a
+    /// line, NaN where peaks do not determine it.
+    fn spread(&self, of_peak: f64) -> f64 {
+        let above = self.widths.partition_point(|(at, _)| *at < of_peak).max(1);
         match (self.widths.get(above - 1), self.widths.get(above)) {
-            (Some(low), Some(high)) => low.1 + (high.1 - low.1) * (seen - low.0) / (high.0 - low.0),
+            (Some(low), Some(high)) => {
+                low.1 + (high.1 - low.1) * (of_peak - low.0) / (high.0 - low.0)
+            }
             _ => f64::NAN,
         }
     }
 
     /// Most that a line of density `highest` reaches beside noise, `distance` cycles per sample away and beyond.
     fn leaked(&self, distance: f64, highest: f64) -> f64 {
-        let place = (distance * 2.0 * (self.leak.len() - 1) as f64) as usize;
-        RAISED * RAISED * self.leak[place.min(self.leak.len() - 1)] * highest
+        let index = (distance * 2.0 * (self.leak.len() - 1) as f64) as usize;
+        RAISED * RAISED * self.leak[index.min(self.leak.len() - 1)] * highest
     }
 
     /// Flag of a search whose highest density in the band is `peak` above the mean beside it, `floor`, in bin `top`.
     fn flag(&self, peak: f64, top: usize, floor: f64, anywhere: Option<(f64, f64)>) -> Quality {
         let is_real = self.kind == SignalKind::Real;
-        if let Some((highest, place)) = anywhere
-            && !self.holds(place)
+        if let Some((highest, line)) = anywhere
+            && !self.holds(line)
         {
             let own = self.band.frequency_hz(top as f64) / self.sampling.sample_rate_hz;
-            let image = if is_real { -place } else { place };
-            if peak < self.leaked(apart(place, own).min(apart(image, own)), highest - floor) {
-                let constant = is_real && apart(place, 0.0) < self.constant;
-                return if constant {
+            let image = if is_real { -line } else { line };
+            let distance = cyclic_distance(line, own).min(cyclic_distance(image, own));
+            if peak < self.leaked(distance, highest - floor) {
+                let is_constant = is_real && cyclic_distance(line, 0.0) < self.constant;
+                return if is_constant {
                     Quality::NoSignal
                 } else {
                     Quality::OutOfBand
@@ -267,71 +269,84 @@ impl PeakSearch {
         }
     }
 
-    /// Whether a place in cycles per sample, or its image, lies in the band.
-    fn holds(&self, place: f64) -> bool {
+    /// Whether a frequency in cycles per sample, or its image, lies in the band.
+    fn holds(&self, frequency: f64) -> bool {
+        let is_image_held = self.kind == SignalKind::Real && self.is_in_band(-frequency);
+        self.is_in_band(frequency) || is_image_held
+    }
+
+    /// Whether a frequency in cycles per sample lies in the band.
+    fn is_in_band(&self, frequency: f64) -> bool {
         let (low_hz, high_hz) = self.sampling.band_hz;
-        let inside = |place: f64| {
-            let frequency_hz = (place - place.round()) * self.sampling.sample_rate_hz;
-            (low_hz..=high_hz).contains(&frequency_hz)
-        };
-        inside(place) || (self.kind == SignalKind::Real && inside(-place))
+        let frequency_hz = (frequency - frequency.round()) * self.sampling.sample_rate_hz;
+        (low_hz..=high_hz).contains(&frequency_hz)
     }
 }
 
-/// Distance of two places on the circle of frequencies \[cycles per sample\].
-fn apart(a: f64, b: f64) -> f64 {
+/// Distance of two frequencies on their circle \[cycles per sample\].
+fn cyclic_distance(a: f64, b: f64) -> f64 {
     (a - b - (a - b).round()).abs()
 }
 
 /// Squares of the standard deviations \[bins^2\] of the peaks of Gaussian spectra in the middle of a band, and of the spectra.
 fn widths(lag_weights: &[f64], padded: usize, bins: usize) -> Result<Vec<(f64, f64)>, Error> {
-    let (spectrum, mut scratch) = (
-        LagSpectrum::new(SignalKind::Complex, lag_weights.len(), padded)?,
-        Scratch::new(),
-    );
-    let mut seen = |width: f64, place: f64| {
-        let lag = |(m, weight): (usize, &f64)| {
-            let turn = std::f64::consts::TAU * m as f64 / padded as f64;
-            let lag =
-                Complex::from_polar(weight * (-0.5 * (turn * width).powi(2)).exp(), turn * place);
-            [lag.re, lag.im]
-        };
-        let lags: Vec<f64> = lag_weights.iter().enumerate().flat_map(lag).collect();
-        let line = spectrum.density(&lags, &mut scratch)?;
-        let density: Vec<f64> = (0..bins)
-            .map(|bin| line[(bin + padded - bins / 2) % padded])
-            .collect();
-        Ok::<_, Error>(floor_and_width(&density, bins / 2, line[0]).1.powi(2))
-    };
-    let own = seen(0.0, 0.0)?.sqrt();
+    let spectrum = LagSpectrum::new(SignalKind::Complex, lag_weights.len(), padded)?;
+    let line = peak_variance(&spectrum, lag_weights, bins, 0.0, 0.0)?;
+    let line_width = line.sqrt();
     let mut pairs = Vec::<(f64, f64)>::new();
     for k in 0..WIDTHS {
-        let width = (k * k) as f64 / 16.0 * own;
-        // peaks fall anywhere between the frequencies
-        let pair = (
-            0.5 * (seen(width, 0.125)? + seen(width, 0.375)?),
-            width * width,
-        );
-        let shows = |last: &(f64, f64)| pair.0 - last.0 > LEAST_SHARE * (pair.1 - last.1);
-        if !pairs.last().is_none_or(shows) {
-            break;
+        let width = (k * k) as f64 / 16.0 * line_width;
+        // peaks are anywhere between the frequencies
+        let quarter = peak_variance(&spectrum, lag_weights, bins, width, 0.125)?;
+        let three_quarters = peak_variance(&spectrum, lag_weights, bins, width, 0.375)?;
+        let of_peak = 0.5 * (quarter + three_quarters);
+        let of_spectrum = width * width;
+        if let Some(last) = pairs.last() {
+            let shows = of_peak - last.0 > LEAST_SHARE * (of_spectrum - last.1);
+            if !shows {
+                break;
+            }
         }
-        pairs.push(pair);
+        pairs.push((of_peak, of_spectrum));
     }
-    // where not even a width like that of a line is shown, the few below it would be chosen by chance
+    // where not even a width like that of a line shows, the few below it would be chosen by chance
     if pairs.len() < LEAST_WIDTHS {
         pairs.clear();
     }
     Ok(pairs)
 }
 
+/// Variance \[bins^2\] of the peak of a Gaussian spectrum of standard deviation `width` \[bins\], `offset` bins from a frequency of the
+/// grid, in the middle of a band of `bins`.
+fn peak_variance(
+    spectrum: &LagSpectrum,
+    lag_weights: &[f64],
+    bins: usize,
+    width: f64,
+    offset: f64,
+) -> Result<f64, Error> {
+    let padded = spectrum.frequencies();
+    let mut lags = Vec::with_capacity(2 * lag_weights.len());
+    for (m, weight) in lag_weights.iter().enumerate() {
+        let turn = std::f64::consts::TAU * m as f64 / padded as f64;
+        let size = weight * (-0.5 * (turn * width).powi(2)).exp();
+        let lag = Complex::from_polar(size, turn * offset);
+        lags.push(lag.re);
+        lags.push(lag.im);
+    }
+    let mut scratch = Scratch::new();
+    let line = spectrum.density(&lags, &mut scratch)?;
+    let mut density = Vec::with_capacity(bins);
+    for bin in 0..bins {
+        density.push(line[(bin + padded - bins / 2) % padded]);
+    }
+    let (_, deviation) = floor_and_width(&density, bins / 2, line[0]);
+    Ok(deviation.powi(2))
+}
+
 /// Mean density beside the main peak, and standard deviation of that \[bins\].
 fn floor_and_width(density: &[f64], top: usize, peak: f64) -> (f64, f64) {
-    let lowest = LazyCell::new(|| {
-        lanes(density, f64::INFINITY, |low, value| {
-            if value < low { value } else { low }
-        })
-    });
+    let lowest = LazyCell::new(|| lowest(density));
     let mut floor = 0.0;
     let mut beside = 0;
     let mut reach = [0.0; 2];
@@ -354,25 +369,25 @@ fn floor_and_width(density: &[f64], top: usize, peak: f64) -> (f64, f64) {
 
 /// Distances \[bins\] from `top` to where the density falls to `level` on either side; to the end of the band if it does not.
 fn half_widths(density: &[f64], top: usize, level: f64) -> [f64; 2] {
-    let distance =
-        |steps: usize, above: f64, below: f64| steps as f64 + (above - level) / (above - below);
-    let down = density[..top].iter().rposition(|value| *value < level);
-    let up = density[top + 1..].iter().position(|value| *value < level);
-    [
-        down.map_or(top as f64, |k| {
-            distance(top - k - 1, density[k + 1], density[k])
-        }),
-        up.map_or((density.len() - 1 - top) as f64, |k| {
-            distance(k, density[top + k], density[top + 1 + k])
-        }),
-    ]
+    let mut down = top as f64;
+    if let Some(k) = density[..top].iter().rposition(|value| *value < level) {
+        let above = density[k + 1];
+        down = (top - k - 1) as f64 + (above - level) / (above - density[k]);
+    }
+    let mut up = (density.len() - 1 - top) as f64;
+    if let Some(k) = density[top + 1..].iter().position(|value| *value < level) {
+        let above = density[top + k];
+        up = k as f64 + (above - level) / (above - density[top + 1 + k]);
+    }
+    [down, up]
 }
 
 /// Mean density away from the peak and from the edges, over which noise of a band leaks out of it,
 /// and the number of bins there; none if the peak fills the band.
 fn mean_beside(density: &[f64], top: usize, reach: [f64; 2]) -> Option<(f64, usize)> {
     let edge = 0.5 * (reach[0] + reach[1]);
-    let (first, last) = (edge as usize, density.len().saturating_sub(edge as usize));
+    let first = edge as usize;
+    let last = density.len().saturating_sub(first);
     let low = ((top as f64 - (LOBE * reach[0]).ceil()).max(0.0) as usize).max(first);
     let high = ((top as f64 + (LOBE * reach[1]).ceil()) as usize + 1).min(last);
     let count = low - first + last - high;
@@ -394,7 +409,7 @@ fn parabola(density: &[f64], top: usize) -> f64 {
     }
 }
 
-/// Folds numbers in independent lanes, so that no step waits for the one before.
+/// Folds numbers in independent lanes, so that successive steps do not depend on each other.
 fn lanes(values: &[f64], start: f64, fold: impl Fn(f64, f64) -> f64) -> f64 {
     let (chunks, rest) = values.as_chunks::<8>();
     let mut lanes = [start; 8];
@@ -411,18 +426,24 @@ pub(crate) fn lanes_sum(values: &[f64]) -> f64 {
     lanes(values, 0.0, |sum, value| sum + value)
 }
 
-/// Place and value of the first highest number; (0, -inf) if there is none.
+/// The lowest number; infinite without numbers.
+fn lowest(values: &[f64]) -> f64 {
+    lanes(
+        values,
+        f64::INFINITY,
+        |low, value| {
+            if value < low { value } else { low }
+        },
+    )
+}
+
+/// Index and value of the first highest number; (0, -inf) without numbers.
 pub(crate) fn highest(values: &[f64]) -> (usize, f64) {
     let highest = lanes(values, f64::NEG_INFINITY, |highest, value| {
         if value > highest { value } else { highest }
     });
-    (
-        values
-            .iter()
-            .position(|value| *value == highest)
-            .unwrap_or(0),
-        highest,
-    )
+    let index = values.iter().position(|value| *value == highest);
+    (index.unwrap_or(0), highest)
 }
 
 #[cfg(test)]

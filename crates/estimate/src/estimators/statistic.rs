@@ -6,7 +6,7 @@
 
 use crate::error::{Error, length};
 use crate::estimators::{GateVelocity, Quality};
-use crate::window::missing::Rule;
+use crate::window::missing::MissingRule;
 use crate::window::{Sample, Scratch};
 
 /// Numbers drawn from one window, to be averaged over windows: I_k of Table 3.
@@ -87,7 +87,7 @@ pub fn estimate_window<S: Sample>(
         estimator.statistic_len(),
         statistic.statistic_len(),
     )?;
-    let rule = Rule::of(window.iter().copied());
+    let rule = MissingRule::from_samples(window.iter().copied());
     if !window.iter().all(|sample| rule.is_measured(*sample)) {
         return Ok(GateVelocity::none(Quality::Invalid));
     }

@@ -6,7 +6,7 @@
 //! A velocity beyond the unambiguous interval folds before any estimator sees it: it reads the one whose beat frequency has the same samples
 //! (63 m/s reads 61.0 m/s at 250 MHz, 80 MHz, 1.55 um).
 
-/// What a velocity estimate is worth.
+/// Quality flag of a velocity estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Quality {
@@ -14,7 +14,7 @@ pub enum Quality {
     Good,
     /// Nothing in the band: zero power, or less than the sidelobes of a constant. Velocity is NaN.
     NoSignal,
-    /// The peak sits on an edge of the band, or what the band holds can be sidelobes of a line
+    /// The peak is on an edge of the band, or the density in the band can be sidelobes of a line
     /// outside. The velocity is that of the highest density in the band and should not be used.
     OutOfBand,
     /// Samples or spectrum are not finite. Velocity is NaN.
@@ -25,11 +25,11 @@ pub enum Quality {
 
 /// Velocity estimate of one gate or map point.
 ///
-/// Estimators of one's own fill in what they know and take the rest from [`GateVelocity::none`]:
+/// User-supplied estimators fill in the quantities that they estimate and take the rest from [`GateVelocity::none`]:
 /// `GateVelocity { velocity_m_s, flag: Quality::Good, ..GateVelocity::none(Quality::Good) }`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateVelocity {
-    /// Radial velocity, positive away from the lidar \[m/s\]; NaN where `flag` says that there is none.
+    /// Radial velocity, positive away from the lidar \[m/s\]; NaN where `flag` is that of no velocity.
     pub velocity_m_s: f64,
     /// Mean power inside the detector band, signal and noise, in signal units squared.
     ///
@@ -54,16 +54,16 @@ pub struct GateVelocity {
     pub resolution_m2_s2: f64,
     /// Signal power over noise power in the detector band; the noise is the mean density away from the main peak.
     ///
-    /// 0 where the band holds no more than that, NaN where unknown. Noise alone has a highest peak too, so that weak signals
-    /// read too much: believe it where the peak stands out of noise, or take `power`. The sidelobes of an unweighted
-    /// window count as noise, so that above 5 dB it reads too low; a Gaussian weighting is good to 20 dB.
+    /// 0 where the band holds no more than that, NaN where unknown. Noise alone has a highest peak too, so that the ratio of weak
+    /// signals is biased high: use it where the peak exceeds noise, or use `power`. The sidelobes of an unweighted
+    /// window count as noise, so that above 5 dB it is biased low; a Gaussian weighting is good to 20 dB.
     pub snr: f64,
-    /// What the estimate is worth.
+    /// Quality flag.
     pub flag: Quality,
 }
 
 impl GateVelocity {
-    /// An estimate without velocity, for the stated reason.
+    /// An estimate without velocity, for the given reason.
     #[must_use]
     pub fn none(flag: Quality) -> Self {
         Self {
@@ -89,7 +89,7 @@ impl GateVelocity {
         }
     }
 
-    /// Multiplies what has the unit of a power.
+    /// Multiplies the quantities in units of power.
     pub(crate) fn scale_power(&mut self, factor: f64) {
         self.power *= factor;
         self.detection *= factor;
@@ -101,7 +101,7 @@ impl GateVelocity {
         self.flag == Quality::Good
     }
 
-    /// Whether the peak stands out of noise: the flag is good and the detection above `threshold`.
+    /// Whether the peak exceeds noise: the flag is good and the detection above `threshold`.
     ///
     /// That is [`NoiseTest::threshold`](crate::estimators::NoiseTest::threshold) times the density of the noise: the detection in the
     /// mean statistic of noise.

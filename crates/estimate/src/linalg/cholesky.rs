@@ -29,34 +29,28 @@ pub(crate) fn cholesky(mut a: Array2<f64>) -> Option<Array2<f64>> {
         for i in first..order {
             let (above, mut rest) = a.view_mut().split_at(Axis(0), i);
             let row = rest.as_slice_mut()?;
-            for j in first..last.min(i + 1) {
-                let product = |other: &[f64]| dot(&row[first..j], &other[first..j]);
-                let sum = row[j]
-                    - if j < i {
-                        product(above.row(j).to_slice()?)
-                    } else {
-                        product(row)
-                    };
-                row[j] = if j < i {
-                    sum / above[[j, j]]
-                } else {
-                    sum.sqrt()
-                };
+            for j in first..last.min(i) {
+                let other = above.row(j).to_slice()?;
+                let sum = row[j] - dot(&row[first..j], &other[first..j]);
+                row[j] = sum / other[j];
+            }
+            if i < last {
+                let sum = row[i] - dot(&row[first..i], &row[first..i]);
+                row[i] = sum.sqrt();
             }
         }
         // the root of a pivot that is not positive is no number, or zero
-        if !a
-            .diag()
-            .slice(s![first..last])
-            .iter()
-            .all(|&pivot| pivot > 0.0)
-        {
+        let diagonal = a.diag();
+        let pivots = diagonal.slice(s![first..last]);
+        if !pivots.iter().all(|&pivot| pivot > 0.0) {
             return None;
         }
     }
-    a.indexed_iter_mut()
-        .filter(|((i, j), _)| j > i)
-        .for_each(|(_, above)| *above = 0.0);
+    for ((i, j), element) in a.indexed_iter_mut() {
+        if j > i {
+            *element = 0.0;
+        }
+    }
     Some(a)
 }
 

@@ -17,10 +17,16 @@ pub(crate) fn jacobi<T: Scalar<Real = f64>>(
     order: usize,
 ) -> Option<(Vec<f64>, Vec<T>)> {
     let mut v = vec![T::zero(); order * order];
-    (0..order).for_each(|k| v[k * (order + 1)] = T::one());
-    let (mut sweeps, mut rotated) = (0..SWEEPS, true);
+    for k in 0..order {
+        v[k * (order + 1)] = T::one();
+    }
+    let mut sweeps = 0;
+    let mut rotated = true;
     while rotated {
-        sweeps.next()?;
+        if sweeps == SWEEPS {
+            return None;
+        }
+        sweeps += 1;
         rotated = false;
         for q in 1..order {
             for p in 0..q {
@@ -32,13 +38,15 @@ pub(crate) fn jacobi<T: Scalar<Real = f64>>(
     if diagonal.iter().any(|value| !value.is_finite()) {
         return None;
     }
-    let mut places: Vec<usize> = (0..order).collect();
-    places.sort_by(|&i, &j| diagonal[i].total_cmp(&diagonal[j]));
-    let vectors = places
-        .iter()
-        .flat_map(|&k| v[k * order..(k + 1) * order].iter().copied())
-        .collect();
-    Some((places.iter().map(|&k| diagonal[k]).collect(), vectors))
+    let mut increasing: Vec<usize> = (0..order).collect();
+    increasing.sort_by(|&i, &j| diagonal[i].total_cmp(&diagonal[j]));
+    let mut values = Vec::with_capacity(order);
+    let mut vectors = Vec::with_capacity(order * order);
+    for k in increasing {
+        values.push(diagonal[k]);
+        vectors.extend_from_slice(&v[k * order..(k + 1) * order]);
+    }
+    Some((values, vectors))
 }
 
 /// One rotation of columns p < q that annihilates a_pq; `Some(false)` if that element is negligible, `None` if it is not finite.
@@ -49,13 +57,17 @@ fn rotate<T: Scalar<Real = f64>>(
     p: usize,
     q: usize,
 ) -> Option<bool> {
-    let at = |row: usize, column: usize| row + column * order;
-    let off = a[at(p, q)];
+    let pp = p + p * order;
+    let pq = p + q * order;
+    let qp = q + p * order;
+    let qq = q + q * order;
+    let off = a[pq];
     let size = off.abs();
     if !size.is_finite() {
         return None;
     }
-    let (app, aqq) = (a[at(p, p)].re(), a[at(q, q)].re());
+    let app = a[pp].re();
+    let aqq = a[qq].re();
     // negligible: it cannot change either diagonal element any more
     if size <= f64::EPSILON * 0.25 * (app.abs() * aqq.abs()).sqrt() || size < f64::MIN_POSITIVE {
         return Some(false);
@@ -66,23 +78,30 @@ fn rotate<T: Scalar<Real = f64>>(
     let c = t.hypot(1.0).recip();
     let s = t * c;
     // columns p and q of A and V times [[c, s phase], [-s conj(phase), c]]
-    let (up, down) = (phase.mul_real(s), phase.conj().mul_real(s));
+    let up = phase.mul_real(s);
+    let down = phase.conj().mul_real(s);
     for matrix in [&mut *a, &mut *v] {
         let (before, from_q) = matrix.split_at_mut(q * order);
         for (x, y) in before[p * order..(p + 1) * order]
             .iter_mut()
             .zip(&mut from_q[..order])
         {
-            (*x, *y) = (x.mul_real(c) - *y * down, *x * up + y.mul_real(c));
+            let new_x = x.mul_real(c) - *y * down;
+            *y = *x * up + y.mul_real(c);
+            *x = new_x;
         }
     }
     // rows p and q of A times the adjoint: A stays Hermitian
     for k in 0..order {
-        (a[at(p, k)], a[at(q, k)]) = (a[at(k, p)].conj(), a[at(k, q)].conj());
+        // one after the other would differ where k is p or q
+        let kp = a[k + p * order].conj();
+        let kq = a[k + q * order].conj();
+        a[p + k * order] = kp;
+        a[q + k * order] = kq;
     }
-    a[at(p, q)] = T::zero();
-    a[at(q, p)] = T::zero();
-    a[at(p, p)] = T::from_real(app - t * size);
-    a[at(q, q)] = T::from_real(aqq + t * size);
+    a[pq] = T::zero();
+    a[qp] = T::zero();
+    a[pp] = T::from_real(app - t * size);
+    a[qq] = T::from_real(aqq + t * size);
     Some(true)
 }

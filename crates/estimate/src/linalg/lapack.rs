@@ -30,16 +30,20 @@ unsafe fn heev<T: Scalar<Real = f64>>(
     work: *mut T,
     lwork: c_int,
 ) -> c_int {
-    let [jobz, uplo] = [jobz, uplo].map(|letter| (letter as u8).to_ascii_uppercase());
-    let unknown = [!matches!(jobz, b'N' | b'V'), !matches!(uplo, b'L' | b'U')];
-    let wrong = [
-        (unknown[0], 1),
-        (unknown[1], 2),
-        (n < 0, 3),
-        (lda < n.max(1), 5),
-    ];
-    if let Some((_, place)) = wrong.iter().find(|(is_wrong, _)| *is_wrong) {
-        return -place;
+    let jobz = (jobz as u8).to_ascii_uppercase();
+    let uplo = (uplo as u8).to_ascii_uppercase();
+    // the number of the first argument that is invalid
+    if !matches!(jobz, b'N' | b'V') {
+        return -1;
+    }
+    if !matches!(uplo, b'L' | b'U') {
+        return -2;
+    }
+    if n < 0 {
+        return -3;
+    }
+    if lda < n.max(1) {
+        return -5;
     }
     if lwork == -1 || n == 0 {
         // the kernel brings its own memory; 1 is the least that LAPACK allows to ask for
@@ -53,23 +57,27 @@ unsafe fn heev<T: Scalar<Real = f64>>(
         let a = ArrayViewMut2::from_shape_ptr((order, order).strides((1, lda as usize)), a);
         (a, std::slice::from_raw_parts_mut(w, order))
     };
-    let element = |(row, column): (usize, usize)| match row.cmp(&column) {
-        std::cmp::Ordering::Equal => T::from_real(a[(row, column)].re()),
-        order if order.is_gt() == (uplo == b'L') => a[(row, column)],
-        _ => a[(column, row)].conj(),
-    };
-    let full = (0..order * order)
-        .map(|place| element((place % order, place / order)))
-        .collect();
+    let mut full = Vec::with_capacity(order * order);
+    for column in 0..order {
+        for row in 0..order {
+            let is_stored = (row > column) == (uplo == b'L');
+            full.push(if row == column {
+                T::from_real(a[(row, column)].re())
+            } else if is_stored {
+                a[(row, column)]
+            } else {
+                a[(column, row)].conj()
+            });
+        }
+    }
     let Some((found, basis)) = jacobi(full, order) else {
         return n;
     };
     values.copy_from_slice(&found);
     if jobz == b'V' {
-        basis
-            .into_iter()
-            .enumerate()
-            .for_each(|(place, value)| a[(place % order, place / order)] = value);
+        for (index, value) in basis.into_iter().enumerate() {
+            a[(index % order, index / order)] = value;
+        }
     }
     0
 }

@@ -35,19 +35,14 @@ pub(crate) fn hermitian_eigen<T: Scalar<Real = f64> + Lapack>(
     let (rows, order) = a.dim();
     not_empty(field, order)?;
     length(field, order, rows)?;
-    let failed = |reason| Error::Linalg {
-        what: field,
-        order,
-        reason,
-    };
     if a.iter().any(|value| !value.abs().is_finite()) {
-        return Err(failed("holds a value that is not finite"));
+        return Err(failed(field, order, "holds a value that is not finite"));
     }
     let mut columns = Array2::zeros(a.raw_dim().f());
     columns.assign(&a);
     let (values, vectors) = columns
         .eigh(UPLO::Lower)
-        .map_err(|_| failed("has no converged eigenvalues"))?;
+        .map_err(|_| failed(field, order, "has no converged eigenvalues"))?;
     let mut scaled = vectors.clone();
     for (mut column, value) in scaled.columns_mut().into_iter().zip(&values) {
         column.mapv_inplace(|element| element.mul_real(*value));
@@ -56,9 +51,16 @@ pub(crate) fn hermitian_eigen<T: Scalar<Real = f64> + Lapack>(
     if residual <= RESIDUAL * order as f64 * norm(&a) {
         Ok((values, vectors))
     } else {
-        Err(failed(
-            "is not Hermitian, or its eigenvectors are those of the conjugate",
-        ))
+        let reason = "is not Hermitian, or its eigenvectors are those of the conjugate";
+        Err(failed(field, order, reason))
+    }
+}
+
+fn failed(what: &'static str, order: usize, reason: &'static str) -> Error {
+    Error::Linalg {
+        what,
+        order,
+        reason,
     }
 }
 
@@ -76,7 +78,8 @@ pub(crate) fn inverse(
 #[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    let (a, a_rest) = a.as_chunks::<8>();
+    let (b, b_rest) = b.as_chunks::<8>();
     for i in 0..a.len().min(b.len()) {
         for lane in 0..8 {
             sums[lane] += a[i][lane] * b[i][lane];

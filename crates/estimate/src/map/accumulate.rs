@@ -1,10 +1,10 @@
 //! Accumulation over circular regions: Table 3, for any statistic and any estimator.
 //!
 //! Computes the mean of the statistics I_k of all windows within rho of a point, then the velocity of that mean.
-//! Along each line of sight the statistics are kept, and their sums over blocks of eight gates, so that a wide region
-//! adds few rows. Nothing is subtracted: a region knows of no window but its own. Check: against the plain mean of the
+//! Along each line of sight the statistics are stored, and their sums over blocks of eight gates, so that a wide region
+//! adds few rows. Nothing is subtracted: the sum of a region has no term of another window. Check: against the plain mean of the
 //! windows, its independence of the order of rays and of the number of threads, and that windows with a missing sample
-//! are left out and leave every bit of the other regions.
+//! are skipped and do not change a bit of other regions.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -16,14 +16,14 @@ use crate::estimators::{Estimator, GateVelocity, Quality, Statistic};
 use crate::map::region::effective;
 use crate::map::{Chord, PolarPoint, ScanGeometry, WindowCorrelation};
 use crate::parallel::map_indexed;
-use crate::window::missing::Rule;
+use crate::window::missing::MissingRule;
 use crate::window::{Gates, Sample, Sampling, Scratch};
 
 mod streamed;
 
 pub use streamed::ScanSums;
 
-/// Gates whose sum is kept.
+/// Gates of a block, whose sum is stored.
 const BLOCK: usize = 8;
 
 /// Radius rho of the region of a map point \[m\].
@@ -52,16 +52,16 @@ impl Radius {
     }
 }
 
-/// What accumulation gives at one point.
+/// Result of accumulation at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapPoint {
     /// The velocity with its flag; [`Quality::Empty`] where there is no valid window.
     pub estimate: GateVelocity,
     /// Number of valid windows in the region.
     pub level: usize,
-    /// Number of windows of the region that were left out because of a missing sample.
+    /// Number of windows of the region that were skipped because of a missing sample.
     pub left_out: usize,
-    /// Number of independent windows that they are worth; NaN if no correlation was given.
+    /// Effective number of independent windows; NaN if no correlation was given.
     pub n_eff: f64,
 }
 
@@ -71,7 +71,7 @@ pub struct MapPoint {
 /// (185 lines, 937 gates, 64 lags: 100 MB). Pulses of equal elevation share a line.
 pub struct Scan {
     geometry: ScanGeometry,
-    /// Gates whose windows are known: all, but for [`ScanSums::of_gates`].
+    /// Gates whose windows are stored: all, except with [`ScanSums::of_gates`].
     held: Range<usize>,
     numbers: usize,
     /// Statistics of each gate held, the pulses of a line added.
@@ -88,7 +88,7 @@ pub struct Scan {
 impl Scan {
     /// Statistics of all windows of `records` \[ray, sample\]; ray i has elevation `elevation_rad[i]` \[rad\].
     ///
-    /// Several pulses along one line of sight are rays of equal elevation. Windows with a missing sample are left out:
+    /// Several pulses along one line of sight are rays of equal elevation. Windows with a missing sample are skipped:
     /// one that is not finite, a fill value ([`FILL_VALUES`](crate::window::FILL_VALUES)), or one that dwarfs all others
     /// ([`SampleSizes::outsized`](crate::window::SampleSizes::outsized)).
     ///
@@ -104,7 +104,7 @@ impl Scan {
         let (rays, samples) = records.dim();
         length("elevation_rad", rays, elevation_rad.len())?;
         let geometry = ScanGeometry::new(sampling, gates, elevation_rad, samples)?;
-        let rule = Rule::of(records.iter().copied());
+        let rule = MissingRule::from_samples(records.iter().copied());
         let mut sums = ScanSums::new(statistic, gates, geometry, samples)?.with_rule(rule);
         sums.add(0, records)?;
         Ok(sums.finish())
@@ -148,8 +148,10 @@ impl Scan {
             self.add_chord(chord, mean);
         }
         if level > 0 {
-            let share = 1.0 / level as f64;
-            mean.iter_mut().for_each(|value| *value *= share);
+            let weight = 1.0 / level as f64;
+            for value in mean {
+                *value *= weight;
+            }
         }
         Ok(level)
     }
@@ -166,32 +168,44 @@ impl Scan {
         estimator: &(impl Estimator + ?Sized),
     ) -> Result<Vec<MapPoint>, Error> {
         length("statistic", estimator.statistic_len(), self.numbers)?;
-        let state = || (Scratch::new(), vec![0.0; self.numbers]);
-        let found = map_indexed(points.len(), state, |(scratch, mean), index| {
-            let point = points[index];
-            let radius_m = radius.at_m(point.range_m)?;
-            let level = self.region_mean(point, radius_m, mean)?;
-            let mut estimate = GateVelocity::none(Quality::Empty);
-            if level > 0 {
-                estimate = estimator.estimate(mean, scratch);
-                estimate.scale_power(self.scale * self.scale);
-            }
-            let of_chord = |chord: Chord| chord.gates() * self.geometry.rays.count(chord.line);
-            let windows: usize = self.chords(point, radius_m).map(of_chord).sum();
-            Ok(MapPoint {
-                estimate,
-                level,
-                left_out: windows - level,
-                n_eff: correlation.map_or(f64::NAN, |gamma| self.n_eff(point, radius_m, gamma)),
-            })
-        });
+        let found = map_indexed(
+            points.len(),
+            || (Scratch::new(), vec![0.0; self.numbers]),
+            |(scratch, mean), index| {
+                let point = points[index];
+                let radius_m = radius.at_m(point.range_m)?;
+                let level = self.region_mean(point, radius_m, mean)?;
+                let mut estimate = GateVelocity::none(Quality::Empty);
+                if level > 0 {
+                    estimate = estimator.estimate(mean, scratch);
+                    estimate.scale_power(self.scale * self.scale);
+                }
+                Ok(MapPoint {
+                    estimate,
+                    level,
+                    left_out: self.windows(point, radius_m) - level,
+                    n_eff: correlation.map_or(f64::NAN, |gamma| self.n_eff(point, radius_m, gamma)),
+                })
+            },
+        );
         found.into_iter().collect()
+    }
+
+    /// Windows of a region that are stored, valid or not.
+    fn windows(&self, point: PolarPoint, radius_m: f64) -> usize {
+        let mut windows = 0;
+        for chord in self.chords(point, radius_m) {
+            windows += chord.gates() * self.geometry.rays.count(chord.line);
+        }
+        windows
     }
 
     /// Effective number of independent windows of a region, (sum n)^2 / sum of gamma^2 over pairs of one pulse.
     #[must_use]
     pub fn n_eff(&self, point: PolarPoint, radius_m: f64, correlation: &WindowCorrelation) -> f64 {
-        let (mut level, mut pairs, start) = (0, 0.0, self.held.start);
+        let start = self.held.start;
+        let mut level = 0;
+        let mut pairs = 0.0;
         for chord in self.chords(point, radius_m) {
             level += self.valid(chord);
             let whole = correlation.pair_sum(chord.gates());
@@ -208,13 +222,11 @@ impl Scan {
         effective(level, pairs)
     }
 
-    /// Chords of a region, as far as they are held, by increasing elevation.
+    /// Chords of a region within the stored gates, by increasing elevation.
     fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
         self.geometry.chords(point, radius_m).filter_map(|chord| {
-            let (first, last) = (
-                chord.first.max(self.held.start),
-                chord.last.min(self.held.end - 1),
-            );
+            let first = chord.first.max(self.held.start);
+            let last = chord.last.min(self.held.end - 1);
             (first <= last).then_some(Chord {
                 first,
                 last,
@@ -226,31 +238,26 @@ impl Scan {
     /// Valid windows of a chord.
     fn valid(&self, chord: Chord) -> usize {
         let row = chord.line * (self.held.len() + 1);
-        let before = |gate: usize| self.counts[row + gate - self.held.start];
-        before(chord.last + 1) - before(chord.first)
+        let counts = &self.counts[row..row + self.held.len() + 1];
+        counts[chord.last + 1 - self.held.start] - counts[chord.first - self.held.start]
     }
 
     /// Adds the sum over a chord to `out`: whole blocks, and the gates before and behind them.
     fn add_chord(&self, chord: Chord, out: &mut [f64]) {
-        let (start, gates) = (self.held.start, self.held.len());
-        let blocks = self.blocks.len() / (self.geometry.line_elevation_rad().len() * self.numbers);
-        let of = |table: &'_ [f64], place: usize, out: &mut [f64]| {
-            add(
-                out,
-                &table[place * self.numbers..(place + 1) * self.numbers],
-            );
-        };
+        let start = self.held.start;
+        let numbers = self.numbers;
+        let line_numbers = self.held.len() * numbers;
+        let line_blocks = self.blocks.len() / self.geometry.line_elevation_rad().len();
+        let rows = &self.rows[chord.line * line_numbers..][..line_numbers];
+        let blocks = &self.blocks[chord.line * line_blocks..][..line_blocks];
         let mut gate = chord.first;
         while gate <= chord.last {
             if gate.is_multiple_of(BLOCK) && gate + BLOCK <= chord.last + 1 {
-                of(
-                    &self.blocks,
-                    chord.line * blocks + gate / BLOCK - start.div_ceil(BLOCK),
-                    out,
-                );
+                let block = gate / BLOCK - start.div_ceil(BLOCK);
+                add(out, &blocks[block * numbers..][..numbers]);
                 gate += BLOCK;
             } else {
-                of(&self.rows, chord.line * gates + gate - start, out);
+                add(out, &rows[(gate - start) * numbers..][..numbers]);
                 gate += 1;
             }
         }
@@ -265,8 +272,13 @@ fn add(sum: &mut [f64], term: &[f64]) {
 
 /// Sum of gamma^2 over the ordered pairs of valid windows of one ray.
 fn valid_pairs(invalid: &[bool], correlation: &WindowCorrelation) -> f64 {
-    let valid = || invalid.iter().enumerate().filter(|(_, bad)| !**bad);
-    valid()
-        .flat_map(|(i, _)| valid().map(move |(j, _)| correlation.squared(i.abs_diff(j))))
-        .sum()
+    let mut sum = 0.0;
+    for (i, i_invalid) in invalid.iter().enumerate() {
+        for (j, j_invalid) in invalid.iter().enumerate() {
+            if !i_invalid && !j_invalid {
+                sum += correlation.squared(i.abs_diff(j));
+            }
+        }
+    }
+    sum
 }

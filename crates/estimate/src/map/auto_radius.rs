@@ -1,8 +1,8 @@
 //! The radius rho(R) that a target variance needs: small where the signal is strong or the lines are close, larger
 //! where they are not.
 //!
-//! A large region averages noise away and blurs the vortex; this takes the smallest that is enough. The information of a region is
-//! the sum of that of its pulses, each of the record that its chord covers. Check: the variance asked for is reached and
+//! A large region averages noise away and blurs the vortex; this takes the smallest sufficient one. The information of a region is
+//! the sum over its pulses of that of the record that the chord covers. Check: the requested variance is reached and
 //! not by much more; the radius grows with range.
 
 use crate::error::{Error, positive};
@@ -13,10 +13,10 @@ use crate::map::{PolarPoint, Radius, ScanGeometry};
 const BISECTIONS: usize = 10;
 
 impl ScanGeometry {
-    /// Smallest radius \[m\] about `point` whose region has so much `information`, 1/(m/s)^2, to a thousandth of `largest_m`, where a
-    /// pulse has `by_gates` in a chord of 1, 2, .. gates.
+    /// Smallest radius \[m\] about `point` whose region has at least `information`, 1/(m/s)^2, to a thousandth of `largest_m`. `by_gates`
+    /// holds the information of a pulse in a chord of 1, 2, .. gates.
     ///
-    /// `None` if even `largest_m` is not enough.
+    /// `None` if even `largest_m` is too small.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] unless `information` and `largest_m` are above 0.
@@ -29,15 +29,27 @@ impl ScanGeometry {
     ) -> Result<Option<f64>, Error> {
         positive("information", information)?;
         positive("largest_m", largest_m)?;
-        let enough = |radius_m: f64| self.information(point, radius_m, by_gates) >= information;
-        if !enough(largest_m) {
+        if !self.has_information(point, largest_m, by_gates, information) {
             return Ok(None);
         }
-        if enough(0.0) {
+        if self.has_information(point, 0.0, by_gates, information) {
             return Ok(Some(0.0));
         }
-        let [_, enough_m] = bisected(0.0, largest_m, BISECTIONS, |radius_m| !enough(radius_m));
+        let [_, enough_m] = bisected(0.0, largest_m, BISECTIONS, |radius_m| {
+            !self.has_information(point, radius_m, by_gates, information)
+        });
         Ok(Some(enough_m))
+    }
+
+    /// Whether the region of a radius has at least `needed` information.
+    fn has_information(
+        &self,
+        point: PolarPoint,
+        radius_m: f64,
+        by_gates: &[f64],
+        needed: f64,
+    ) -> bool {
+        self.information(point, radius_m, by_gates) >= needed
     }
 }
 
@@ -47,8 +59,8 @@ impl Radius {
     ///
     /// `by_gates` gives the information of one pulse on the velocity, 1/(m/s)^2, in chords of 1, 2, .. gates at a range \[m\]:
     /// that of the record ([`RecordModel::information`](crate::bound::RecordModel::information)) for the signal-to-noise ratio
-    /// there, less what the estimator loses. Between the ranges of a table of 65, increasing, the radius is interpolated. Where
-    /// `largest_m` is not enough it is taken all the same: the bound tells.
+    /// there, less the losses of the estimator. The radius is interpolated in a table of 65 increasing ranges. Where `largest_m`
+    /// does not reach the target it is used all the same; the bound reports it.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a target or radius that is not above 0.
@@ -62,24 +74,21 @@ impl Radius {
         let ranges_m = geometry.gate_ranges_m();
         let lines = geometry.line_elevation_rad();
         let elevation_rad = lines[lines.len() / 2];
-        let (first_m, last_m) = (ranges_m[0], ranges_m[ranges_m.len() - 1]);
+        let first_m = ranges_m[0];
+        let last_m = ranges_m[ranges_m.len() - 1];
         let step_m = (last_m - first_m) / 64.0;
-        let table_m: Vec<f64> = (0..=64)
-            .map(|k| {
-                let range_m = first_m + f64::from(k) * step_m;
-                let point = PolarPoint {
-                    range_m,
-                    elevation_rad,
-                };
-                let radius_m = geometry.radius_for(
-                    point,
-                    target_m_s.powi(-2),
-                    &by_gates(range_m),
-                    largest_m,
-                )?;
-                Ok(radius_m.unwrap_or(largest_m))
-            })
-            .collect::<Result<_, Error>>()?;
+        let information = target_m_s.powi(-2);
+        let mut table_m = Vec::with_capacity(65);
+        for k in 0..=64 {
+            let range_m = first_m + f64::from(k) * step_m;
+            let point = PolarPoint {
+                range_m,
+                elevation_rad,
+            };
+            let radius_m =
+                geometry.radius_for(point, information, &by_gates(range_m), largest_m)?;
+            table_m.push(radius_m.unwrap_or(largest_m));
+        }
         Ok(Self::OfRange(Box::new(move |range_m| {
             let place = if step_m > 0.0 {
                 ((range_m - first_m) / step_m).clamp(0.0, 64.0)

@@ -44,48 +44,60 @@ impl Moments {
 
     fn statistics(&self) -> ErrorStatistics {
         let n = self.count;
-        let some = |enough: bool, value: f64| if enough { value } else { f64::NAN };
         let variance = self.m2 / (n - 1.0);
-        let std_m_s = some(n > 1.5, variance.sqrt());
+        let std_m_s = value_if(n > 1.5, variance.sqrt());
         // central moments in population form
-        let (c2, c3, c4) = (self.m2 / n, self.m3 / n, self.m4 / n);
-        let bias_m_s = some(n > 0.5, self.mean);
+        let c2 = self.m2 / n;
+        let c3 = self.m3 / n;
+        let c4 = self.m4 / n;
+        let bias_m_s = value_if(n > 0.5, self.mean);
         let rms_m_s = (bias_m_s * bias_m_s + c2).sqrt();
-        // Fourth moments of few numbers are mostly too small: what Gaussian errors of that variance and bias have counts as so many
-        // numbers more.
-        let with_gaussian = |found: f64, gaussian: f64| {
-            ((n - 1.0) * found + GAUSSIAN * gaussian) / (n - 1.0 + GAUSSIAN)
-        };
         let fourth = variance * variance * (n - 1.0) / (n + 1.0);
         let squared_bias = (bias_m_s * bias_m_s - variance / n).max(0.0);
         let of_variance = ((c4 - c2 * c2 * (n - 3.0) / (n - 1.0)) / n).max(0.0);
-        let of_variance = with_gaussian(of_variance, 2.0 * fourth / (n - 1.0));
+        let of_variance = with_gaussian(n, of_variance, 2.0 * fourth / (n - 1.0));
         let of_squares = (c4 + 4.0 * bias_m_s * c3 + 4.0 * bias_m_s * bias_m_s * c2 - c2 * c2)
             .max(0.0)
             / (n - 1.0);
         let of_squares = with_gaussian(
+            n,
             of_squares,
             (2.0 * fourth + 4.0 * squared_bias * variance) / n,
         );
         // About Student's factor for one and for two standard errors.
-        let few = 1.0 + 0.75 / (n - 1.0);
-        let half_ratio = |variance: f64, of: f64| {
-            if variance == 0.0 {
-                0.0
-            } else {
-                few * variance.sqrt() / (2.0 * of)
-            }
-        };
+        let student = 1.0 + 0.75 / (n - 1.0);
+        let std_error_m_s = root_error(student, of_variance, std_m_s);
+        let rms_error_m_s = root_error(student, of_squares, rms_m_s);
         ErrorStatistics {
             count: n as usize,
             missing: self.missing,
             bias_m_s,
-            bias_standard_error_m_s: some(n > 1.5, few * (variance / n).sqrt()),
+            bias_standard_error_m_s: value_if(n > 1.5, student * (variance / n).sqrt()),
             std_m_s,
-            std_standard_error_m_s: some(n > 1.5, half_ratio(of_variance, std_m_s)),
+            std_standard_error_m_s: value_if(n > 1.5, std_error_m_s),
             rms_m_s,
-            rms_standard_error_m_s: some(n > 1.5, half_ratio(of_squares, rms_m_s)),
+            rms_standard_error_m_s: value_if(n > 1.5, rms_error_m_s),
         }
+    }
+}
+
+/// The value if there are enough numbers, else NaN.
+fn value_if(enough: bool, value: f64) -> f64 {
+    if enough { value } else { f64::NAN }
+}
+
+/// A fourth moment of `n` errors, averaged with that of Gaussian errors of the same variance and bias, which counts as
+/// [`GAUSSIAN`] errors more: fourth moments of few numbers are mostly too small.
+fn with_gaussian(n: f64, found: f64, gaussian: f64) -> f64 {
+    ((n - 1.0) * found + GAUSSIAN * gaussian) / (n - 1.0 + GAUSSIAN)
+}
+
+/// Standard error of a `root` from the variance of its square, times Student's factor; 0 where that variance is 0.
+fn root_error(student: f64, variance: f64, root: f64) -> f64 {
+    if variance == 0.0 {
+        0.0
+    } else {
+        student * variance.sqrt() / (2.0 * root)
     }
 }
 

@@ -3,7 +3,7 @@
 //! Fitted by expectation maximisation: the density of an error e is s N(e; b, sigma) + (1 - s)/B over a band of width B.
 //! Check: the parameters of drawn mixtures come back within their standard errors.
 
-/// The fitted mixture with standard errors; NaN where fewer than 20 good estimates are left to tell.
+/// The fitted mixture with standard errors; NaN with fewer than 20 good estimates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GoodAndBad {
     /// Standard deviation of the good estimates, m/s.
@@ -26,8 +26,8 @@ const LEAST_GOOD: f64 = 20.0;
 /// Steps of the iteration; it settles within some ten where good and bad are apart.
 const STEPS: usize = 300;
 
-/// Tells good errors \[m/s\] from bad ones; NaN stands for an estimate that says itself that it is none, and the floor is
-/// `band_m_s` wide. Without any error all is NaN.
+/// Separates good errors \[m/s\] from bad ones, which form a floor `band_m_s` wide; NaN is an estimate that is flagged as none. All
+/// results are NaN without errors.
 #[must_use]
 pub fn good_and_bad(errors_m_s: &[f64], band_m_s: f64) -> GoodAndBad {
     let found: Vec<f64> = errors_m_s
@@ -38,11 +38,10 @@ pub fn good_and_bad(errors_m_s: &[f64], band_m_s: f64) -> GoodAndBad {
     let mut sizes: Vec<f64> = found.iter().map(|e| e.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     let all = errors_m_s.len() as f64;
-    let (mut share, mut mean, mut std) = (
-        0.95,
-        0.0,
-        sizes.get(sizes.len() / 2).map_or(f64::NAN, |m| m / 0.674_5),
-    );
+    let mut share = 0.95;
+    let mut mean = 0.0;
+    // from the median of the sizes
+    let mut std = sizes.get(sizes.len() / 2).map_or(f64::NAN, |m| m / 0.674_5);
     let mut good = 0.0;
     for _ in 0..STEPS {
         let mut sums = [0.0; 3];
@@ -62,17 +61,20 @@ pub fn good_and_bad(errors_m_s: &[f64], band_m_s: f64) -> GoodAndBad {
     }
     // a bell as wide as the floor is the floor
     let resolved = good >= LEAST_GOOD && std < 0.25 * band_m_s;
+    if !resolved {
+        mean = f64::NAN;
+        std = f64::NAN;
+    }
     let bad = if resolved { (all - good).max(0.0) } else { all };
-    let only = |value: f64| if resolved { value } else { f64::NAN };
     GoodAndBad {
-        std_good_m_s: only(std),
-        std_good_error_m_s: only(std / (2.0 * good).sqrt()),
+        std_good_m_s: std,
+        std_good_error_m_s: std / (2.0 * good).sqrt(),
         bad_fraction: bad / all,
         // the posterior of a fraction from counts: not 0 where no estimate was bad
         bad_fraction_error: ((bad + 1.0) * (all - bad + 1.0) / ((all + 2.0).powi(2) * (all + 3.0)))
             .sqrt(),
-        bias_m_s: only(mean),
-        bias_error_m_s: only(std / good.sqrt()),
+        bias_m_s: mean,
+        bias_error_m_s: std / good.sqrt(),
     }
 }
 

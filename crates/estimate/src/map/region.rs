@@ -23,15 +23,16 @@ pub struct PolarPoint {
 /// All pairs of elevation \[rad\] and range \[m\], ranges running fastest: a map \[elevation, range\].
 #[must_use]
 pub fn polar_points(elevation_rad: &[f64], range_m: &[f64]) -> Vec<PolarPoint> {
-    elevation_rad
-        .iter()
-        .flat_map(|&elevation_rad| {
-            range_m.iter().map(move |&range_m| PolarPoint {
+    let mut points = Vec::with_capacity(elevation_rad.len() * range_m.len());
+    for &elevation_rad in elevation_rad {
+        for &range_m in range_m {
+            points.push(PolarPoint {
                 range_m,
                 elevation_rad,
-            })
-        })
-        .collect()
+            });
+        }
+    }
+    points
 }
 
 /// Gates `first` ..= `last` of line of sight `line` that lie in a region.
@@ -54,13 +55,11 @@ impl Chord {
 }
 
 /// Which records (rays) belong to each line of sight: listed, which needs memory for each ray, or one line after the other.
-///
-/// The rays of each line, increasing: those that stand from one bound to the next.
 #[derive(Debug, Clone)]
 pub(crate) struct Rays {
-    /// Place of the first ray of each line, and one behind the last of all.
+    /// Position of the first ray of each line, and one behind the last of all.
     bounds: Vec<usize>,
-    /// The ray at each place; none where the rays stand line by line themselves.
+    /// The ray at each position, increasing within a line; none where the rays are in the order of the lines.
     listed: Option<Vec<usize>>,
 }
 
@@ -81,11 +80,12 @@ impl Rays {
                 .total_cmp(&elevation_rad[b])
                 .then(a.cmp(&b))
         });
-        let (mut lines, mut bounds) = (Vec::new(), Vec::new());
-        for (place, &ray) in order.iter().enumerate() {
+        let mut lines = Vec::new();
+        let mut bounds = Vec::new();
+        for (position, &ray) in order.iter().enumerate() {
             if lines.last() != Some(&elevation_rad[ray]) {
                 lines.push(elevation_rad[ray]);
-                bounds.push(place);
+                bounds.push(position);
             }
         }
         bounds.push(order.len());
@@ -98,15 +98,17 @@ impl Rays {
         )
     }
 
-    fn places(&self, line: usize) -> Range<usize> {
-        self.bounds
-            .get(line..line + 2)
-            .map_or(0..0, |ends| ends[0]..ends[1])
+    /// Positions of the rays of a line; empty for a line that does not exist.
+    fn positions(&self, line: usize) -> Range<usize> {
+        match self.bounds.get(line..line + 2) {
+            Some(bounds) => bounds[0]..bounds[1],
+            None => 0..0,
+        }
     }
 
     /// Number of rays of a line.
     pub(crate) fn count(&self, line: usize) -> usize {
-        self.places(line).len()
+        self.positions(line).len()
     }
 
     /// The rays of a line that are in `range`, increasing.
@@ -115,35 +117,30 @@ impl Rays {
         line: usize,
         range: &Range<usize>,
     ) -> impl Iterator<Item = usize> + '_ {
-        let places = self.places(line);
-        let (listed, regular) = match &self.listed {
+        let positions = self.positions(line);
+        let listed = self.listed.as_deref();
+        let within = match listed {
             Some(rays) => {
-                let all = &rays[places];
-                let [first, end] =
-                    [range.start, range.end].map(|bound| all.partition_point(|ray| *ray < bound));
-                (&all[first..end.max(first)], 0..0)
+                let of_line = &rays[positions.clone()];
+                let first = of_line.partition_point(|ray| *ray < range.start);
+                let end = of_line.partition_point(|ray| *ray < range.end);
+                positions.start + first..positions.start + end
             }
-            None => (
-                &[][..],
-                places.start.max(range.start)..places.end.min(range.end),
-            ),
+            None => positions.start.max(range.start)..positions.end.min(range.end),
         };
-        listed.iter().copied().chain(regular)
+        within.map(move |position| listed.map_or(position, |rays| rays[position]))
     }
 }
 
-/// Refuses angles that are none of a line of sight.
+/// Refuses an empty list of elevations, and one that is not finite or beyond +-pi.
 pub(crate) fn check_angles(elevation_rad: &[f64]) -> Result<(), Error> {
     not_empty("elevation_rad", elevation_rad.len())?;
-    elevation_rad.iter().try_for_each(|&value| {
+    for &value in elevation_rad {
         finite("elevation_rad", value)?;
-        check(
-            "elevation_rad",
-            value,
-            "between -pi and pi",
-            value.abs() <= std::f64::consts::PI,
-        )
-    })
+        let is_allowed = value.abs() <= std::f64::consts::PI;
+        check("elevation_rad", value, "between -pi and pi", is_allowed)?;
+    }
+    Ok(())
 }
 
 /// Where the windows of a scan are. Rays (pulses) of equal elevation form one line of sight.
@@ -280,9 +277,15 @@ impl ScanGeometry {
     /// Gates whose ranges are from `low_m` to `high_m`, and one more at each end.
     #[must_use]
     pub fn gates_between(&self, low_m: f64, high_m: f64) -> Range<usize> {
-        let place = |range_m: f64| (range_m - self.first_range_m) / self.spacing_m;
-        let start = (place(low_m).floor().max(0.0) as usize).min(self.gates - 1);
-        start..(place(high_m).ceil().max(0.0) as usize + 1).clamp(start + 1, self.gates)
+        let low = self.gate_at(low_m).floor().max(0.0) as usize;
+        let high = self.gate_at(high_m).ceil().max(0.0) as usize;
+        let start = low.min(self.gates - 1);
+        start..(high + 1).clamp(start + 1, self.gates)
+    }
+
+    /// Fractional index of the gate at a range \[m\].
+    fn gate_at(&self, range_m: f64) -> f64 {
+        (range_m - self.first_range_m) / self.spacing_m
     }
 
     /// Chords of the disc of radius `radius_m` \[m\] about `point`, by increasing elevation.
@@ -307,15 +310,16 @@ impl ScanGeometry {
                 (Some((own, _)), Some((other, _))) => sin_cos_between(own, other),
                 _ => (self.lines[line] - point.elevation_rad).sin_cos(),
             };
-            let (across_m, along_m) = (point.range_m * sin, point.range_m * cos);
+            let across_m = point.range_m * sin;
+            let along_m = point.range_m * cos;
             let half_m = (radius_m * radius_m - across_m * across_m).sqrt();
             // A line that misses the disc: max and min below would leave out the NaN.
             if half_m.is_nan() {
                 return None;
             }
-            let place = |range_m: f64| (range_m - self.first_range_m) / self.spacing_m;
-            let first = place(along_m - half_m).ceil().max(0.0);
-            let last = place(along_m + half_m).floor().min(self.gates as f64 - 1.0);
+            let first = self.gate_at(along_m - half_m).ceil().max(0.0);
+            let last = self.gate_at(along_m + half_m).floor();
+            let last = last.min(self.gates as f64 - 1.0);
             (first <= last).then_some(Chord {
                 line,
                 first: first as usize,
@@ -348,43 +352,35 @@ impl ScanGeometry {
         radius_m: f64,
         correlation: &WindowCorrelation,
     ) -> (usize, f64) {
+        let mut pairs = 0.0;
+        for chord in self.chords(point, radius_m) {
+            pairs += self.rays.count(chord.line) as f64 * correlation.pair_sum(chord.gates());
+        }
         let level = self.windows(point, radius_m);
-        (
-            level,
-            effective(
-                level,
-                self.sum_over_rays(point, radius_m, |gates| correlation.pair_sum(gates)),
-            ),
-        )
+        (level, effective(level, pairs))
     }
 
     /// Windows of a region, when all samples are valid.
     #[must_use]
     pub fn windows(&self, point: PolarPoint, radius_m: f64) -> usize {
-        self.sum_over_rays(point, radius_m, |gates| gates as f64) as usize
+        let mut windows = 0;
+        for chord in self.chords(point, radius_m) {
+            windows += self.rays.count(chord.line) * chord.gates();
+        }
+        windows
     }
 
-    /// Information of a region whose rays have `by_gates` in chords of 1, 2, .. gates, and the last of it in longer ones; 0 without any.
+    /// Information of a region when all samples are valid; 0 without any. `by_gates` holds the information of a ray whose chord has
+    /// 1, 2, .. gates; longer chords have the last of it.
     #[must_use]
     pub fn information(&self, point: PolarPoint, radius_m: f64, by_gates: &[f64]) -> f64 {
-        let of_gates = |gates: usize| {
-            by_gates
-                .get(gates.min(by_gates.len()).wrapping_sub(1))
-                .copied()
-                .unwrap_or(0.0)
-        };
-        self.sum_over_rays(point, radius_m, of_gates)
-    }
-
-    /// Sum over the rays of a region of what one gives whose chord has so many gates, all samples being valid.
-    fn sum_over_rays(
-        &self,
-        point: PolarPoint,
-        radius_m: f64,
-        of_gates: impl Fn(usize) -> f64,
-    ) -> f64 {
-        let of_chord = |chord: Chord| self.rays.count(chord.line) as f64 * of_gates(chord.gates());
-        self.chords(point, radius_m).map(of_chord).sum()
+        let mut information = 0.0;
+        for chord in self.chords(point, radius_m) {
+            let index = chord.gates().min(by_gates.len()).wrapping_sub(1);
+            let of_ray = by_gates.get(index).copied().unwrap_or(0.0);
+            information += self.rays.count(chord.line) as f64 * of_ray;
+        }
+        information
     }
 
     /// Most gates of a chord of regions of a radius.
@@ -434,31 +430,33 @@ impl WindowCovariance {
         noise: impl Fn(usize) -> f64,
     ) -> Result<Self, Error> {
         not_empty("weights", weights.len())?;
-        let overlap: Vec<f64> = (0..weights.len())
-            .map(|d| weights[d..].iter().zip(weights).map(|(a, b)| a * b).sum())
-            .collect();
-        let at = |covariance: &dyn Fn(usize) -> f64, gate: usize| -> f64 {
-            let shift = (gate * step_samples) as i64;
-            let reach = overlap.len() as i64 - 1;
-            (-reach..=reach)
-                .map(|d| {
-                    overlap[d.unsigned_abs() as usize]
-                        * covariance((shift + d).unsigned_abs() as usize)
-                })
-                .sum()
-        };
-        let of =
-            |covariance: &dyn Fn(usize) -> f64, reach: &dyn Fn(usize, f64) -> bool| -> Vec<f64> {
-                let all = (0..gates.max(1)).map(|gate| (gate, at(covariance, gate)));
-                all.take_while(|(gate, value)| *gate == 0 || reach(*gate, *value))
-                    .map(|(_, value)| value)
-                    .collect()
-            };
-        let whole = at(&signal, 0);
-        let signal = of(&signal, &|_, value| value.abs() > 1e-8 * whole);
-        // Noise of a band is alike a little at any distance: where windows share no sample, too little to be counted.
-        let noise = of(&noise, &|gate, _| gate * step_samples < 2 * weights.len());
-        Ok(Self { signal, noise })
+        let mut overlap = Vec::with_capacity(weights.len());
+        for d in 0..weights.len() {
+            let products = weights[d..].iter().zip(weights).map(|(a, b)| a * b);
+            overlap.push(products.sum::<f64>());
+        }
+        let whole = windowed_covariance(&overlap, 0, &signal);
+        let mut of_signal = vec![whole];
+        for gate in 1..gates {
+            let value = windowed_covariance(&overlap, gate * step_samples, &signal);
+            let is_correlated = value.abs() > 1e-8 * whole;
+            if !is_correlated {
+                break;
+            }
+            of_signal.push(value);
+        }
+        let mut of_noise = vec![windowed_covariance(&overlap, 0, &noise)];
+        // Band-limited noise is correlated at any distance, but negligibly where windows share no sample.
+        for gate in 1..gates {
+            if gate * step_samples >= 2 * weights.len() {
+                break;
+            }
+            of_noise.push(windowed_covariance(&overlap, gate * step_samples, &noise));
+        }
+        Ok(Self {
+            signal: of_signal,
+            noise: of_noise,
+        })
     }
 
     /// The correlation where the signal is `snr` times what it was given as, or the noise so much less. Without any signal it is that of
@@ -467,23 +465,37 @@ impl WindowCovariance {
     /// # Errors
     /// [`Error::OutOfRange`] if the power of the window is not above 0.
     pub fn correlation(&self, snr: f64) -> Result<WindowCorrelation, Error> {
-        let noise = snr.recip().min(1e12);
-        let at = |gate: usize| {
-            let of = |part: &[f64]| part.get(gate).copied().unwrap_or(0.0);
-            of(&self.signal) + noise * of(&self.noise)
+        let noise_factor = snr.recip().min(1e12);
+        let noise_gates = if noise_factor > 0.0 {
+            self.noise.len()
+        } else {
+            0
         };
-        let power = at(0);
+        let mut covariance = Vec::new();
+        for gate in 0..self.signal.len().max(noise_gates) {
+            let signal = self.signal.get(gate).copied().unwrap_or(0.0);
+            let noise = self.noise.get(gate).copied().unwrap_or(0.0);
+            covariance.push(signal + noise_factor * noise);
+        }
+        let power = covariance[0];
         positive("power of the window", power)?;
-        let gates = self
-            .signal
-            .len()
-            .max(if noise > 0.0 { self.noise.len() } else { 0 });
-        WindowCorrelation::from_gate_lags(
-            &(0..gates)
-                .map(|gate| (at(gate) / power).abs())
-                .collect::<Vec<f64>>(),
-        )
+        for value in &mut covariance {
+            *value = (*value / power).abs();
+        }
+        WindowCorrelation::from_gate_lags(&covariance)
     }
+}
+
+/// Covariance of the weighted sums of two windows that begin `shift` samples apart: `overlap` is the correlation of their weights,
+/// `covariance` that of the samples by their lag.
+fn windowed_covariance(overlap: &[f64], shift: usize, covariance: &dyn Fn(usize) -> f64) -> f64 {
+    let reach = overlap.len() as i64 - 1;
+    let mut sum = 0.0;
+    for d in -reach..=reach {
+        let lag = (shift as i64 + d).unsigned_abs() as usize;
+        sum += overlap[d.unsigned_abs() as usize] * covariance(lag);
+    }
+    sum
 }
 
 /// Correlation gamma between the windowed signals of one pulse against their distance in gates.
@@ -502,15 +514,10 @@ impl WindowCorrelation {
     pub fn from_gate_lags(gamma: &[f64]) -> Result<Self, Error> {
         let first = gamma.first().copied().unwrap_or(f64::NAN);
         check("gamma[0]", first, "1", (first - 1.0).abs() <= 1e-9)?;
-        let correlation = |&value: &f64| {
-            check(
-                "gamma",
-                value,
-                "between 0 and 1",
-                (0.0..=1.0 + 1e-9).contains(&value),
-            )
-        };
-        gamma.iter().try_for_each(correlation)?;
+        for &value in gamma {
+            let is_allowed = (0.0..=1.0 + 1e-9).contains(&value);
+            check("gamma", value, "between 0 and 1", is_allowed)?;
+        }
         Ok(Self {
             squared: gamma.iter().map(|value| value * value).collect(),
         })
@@ -536,17 +543,19 @@ impl WindowCorrelation {
         positive("sample_rate_hz", sample_rate_hz)?;
         not_negative("noise_to_signal", noise_to_signal)?;
         length("weights", gates.window_samples, weights.len())?;
-        let covariance = |lag_samples: usize| {
-            let lag = lag_samples as f64 / (sample_rate_hz * pulse_sigma_s);
-            let noise = if lag_samples == 0 {
-                noise_to_signal
-            } else {
-                0.0
-            };
-            (-0.25 * lag * lag).exp() + noise
-        };
-        WindowCovariance::new(weights, gates.step_samples, count, covariance, |_| 0.0)?
-            .correlation(f64::INFINITY)
+        WindowCovariance::new(
+            weights,
+            gates.step_samples,
+            count,
+            |lag_samples| {
+                let lag = lag_samples as f64 / (sample_rate_hz * pulse_sigma_s);
+                let is_same_sample = lag_samples == 0;
+                let noise = if is_same_sample { noise_to_signal } else { 0.0 };
+                (-0.25 * lag * lag).exp() + noise
+            },
+            |_| 0.0,
+        )?
+        .correlation(f64::INFINITY)
     }
 
     /// gamma^2 of two windows of one pulse `gates` apart.

@@ -36,7 +36,7 @@ impl Autoregression {
         Ok(model)
     }
 
-    /// The same into this model, without allocation once its vectors and `work` have grown.
+    /// Replaces this model by that of [`Autoregression::yule_walker`], without allocation once its vectors and `work` have grown.
     ///
     /// # Errors
     /// As [`Autoregression::yule_walker`]; the model is then unspecified.
@@ -84,7 +84,8 @@ impl Autoregression {
     fn update(&mut self, reflection: Complex<f64>) {
         let count = self.coefficients.len();
         for j in 0..count.div_ceil(2) {
-            let (low, high) = (self.coefficients[j], self.coefficients[count - 1 - j]);
+            let low = self.coefficients[j];
+            let high = self.coefficients[count - 1 - j];
             self.coefficients[j] = low + reflection * high.conj();
             if j != count - 1 - j {
                 self.coefficients[count - 1 - j] = high + reflection * low.conj();
@@ -120,27 +121,31 @@ impl Autoregression {
     /// The correlogram whose transform is |A|^2 / noise power.
     pub(crate) fn inverse_lags(&self, kind: SignalKind, out: &mut Vec<f64>) {
         let order = self.order();
-        let a = |k: usize| {
-            if k == 0 {
-                Complex::ONE
-            } else {
-                self.coefficients[k - 1]
-            }
-        };
         let scale = 1.0 / self.noise_power;
         out.clear();
         for m in 0..=order {
-            let lag: Complex<f64> = (0..=order - m).map(|k| a(k + m) * a(k).conj()).sum();
-            out.extend(
-                [lag.re * scale, lag.im * scale]
-                    .into_iter()
-                    .take(kind.lag_numbers(1)),
-            );
+            let mut lag = Complex::<f64>::ZERO;
+            for k in 0..=order - m {
+                lag += self.coefficient(k + m) * self.coefficient(k).conj();
+            }
+            out.push(lag.re * scale);
+            if kind == SignalKind::Complex {
+                out.push(lag.im * scale);
+            }
+        }
+    }
+
+    /// a_k with a_0 = 1.
+    fn coefficient(&self, k: usize) -> Complex<f64> {
+        if k == 0 {
+            Complex::ONE
+        } else {
+            self.coefficients[k - 1]
         }
     }
 }
 
-/// The error of a reflection coefficient of that size.
+/// The error of a reflection coefficient of absolute value `size`.
 fn unstable(size: f64) -> Error {
     Error::OutOfRange {
         field: "reflection coefficient",

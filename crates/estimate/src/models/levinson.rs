@@ -27,7 +27,8 @@ pub(crate) fn reflect<'w>(
         }
         reflection[stage] = k;
         for (ahead, behind) in ahead[stage..].iter_mut().zip(behind.iter_mut()) {
-            let (u, v) = (*ahead, *behind);
+            let u = *ahead;
+            let v = *behind;
             *ahead = u + k * v;
             *behind = v + k * u;
         }
@@ -36,7 +37,7 @@ pub(crate) fn reflect<'w>(
     Ok((coefficients, reflection, behind[0]))
 }
 
-/// Levinson's update of the coefficients by one order; the last place is new.
+/// Levinson's update of the coefficients by one order; the last element is new.
 fn step_up(coefficients: &mut [f64], k: f64) {
     let Some((last, old)) = coefficients.split_last_mut() else {
         return;
@@ -52,7 +53,8 @@ fn step_up(coefficients: &mut [f64], k: f64) {
         *a += k * *a;
     }
     for (a, b) in low.iter_mut().zip(high.iter_mut().rev()) {
-        let (x, y) = (*a, *b);
+        let x = *a;
+        let y = *b;
         *a = x + k * y;
         *b = y + k * x;
     }

@@ -13,7 +13,7 @@ use crate::estimators::Statistic;
 use crate::spectrum::transform::WindowTransform;
 use crate::window::{Sample, Scratch, Weighting};
 
-/// One weighting and its share in the sum.
+/// One weighting and its factor in the sum.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Taper {
     /// Weights h(n) of the samples.
@@ -69,9 +69,9 @@ impl<S: Sample> Correlogram<S> {
     pub fn with_tapers(tapers: Vec<Taper>) -> Result<Self, Error> {
         let window_samples = tapers.first().map_or(0, |taper| taper.weights.len());
         not_empty("tapers", window_samples)?;
-        tapers
-            .iter()
-            .try_for_each(|taper| length("taper", window_samples, taper.weights.len()))?;
+        for taper in &tapers {
+            length("taper", window_samples, taper.weights.len())?;
+        }
         Ok(Self {
             tapers,
             transform: WindowTransform::new(S::KIND, 2 * window_samples),
@@ -88,17 +88,23 @@ impl<S: Sample> Correlogram<S> {
     /// Weights of the lags of white data, w_m = sum over tapers of factor times the tapers' correlogram, w_0 = 1: 1 -
     /// m / N without weighting.
     ///
-    /// [`SpectralPeak::new`](crate::SpectralPeak::new) takes them to tell spectral width from resolution.
+    /// [`SpectralPeak::new`](crate::SpectralPeak::new) needs them to separate spectral width from resolution.
     #[must_use]
     pub fn lag_weights(&self) -> Vec<f64> {
-        let at = |m: usize| -> f64 {
-            let of = |h: &[f64]| h[m..].iter().zip(h).map(|(a, b)| a * b).sum::<f64>();
-            self.tapers
-                .iter()
-                .map(|taper| taper.factor * of(&taper.weights))
-                .sum()
-        };
-        (0..self.lags()).map(|m| at(m) / at(0)).collect()
+        let mut weights = Vec::with_capacity(self.lags());
+        for m in 0..self.lags() {
+            let mut sum = 0.0;
+            for Taper { weights: h, factor } in &self.tapers {
+                let products = h[m..].iter().zip(h).map(|(a, b)| a * b);
+                sum += factor * products.sum::<f64>();
+            }
+            weights.push(sum);
+        }
+        let first = weights[0];
+        for weight in &mut weights {
+            *weight /= first;
+        }
+        weights
     }
 
     /// Number of lags N, lag 0 included.

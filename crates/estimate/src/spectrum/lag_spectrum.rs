@@ -43,6 +43,11 @@ impl LagSpectrum {
         self.kind.lag_numbers(self.lags)
     }
 
+    /// Number M of frequencies.
+    pub(crate) fn frequencies(&self) -> usize {
+        self.inverse.len()
+    }
+
     /// Densities S(k F_s / M), k = 0 .. M-1 (k > M/2 are the negative frequencies), in signal units squared.
     ///
     /// # Errors
@@ -63,16 +68,15 @@ impl LagSpectrum {
             .transform
             .resize(inner.max(scratch.transform.len()), Complex::ZERO);
         // The transform has the sign exp(+i), so the lags go in conjugated; lags beyond M/2 fold back.
-        let mut deposit = |index: usize, value: Complex<f64>| {
-            if index < half {
-                scratch.half[index] += value;
-            }
-        };
         for m in 0..self.lags {
             let lag = self.kind.lag(correlogram, m).conj();
-            deposit(m % padded, lag);
-            if m > 0 {
-                deposit((padded - m % padded) % padded, lag.conj());
+            let positive = m % padded;
+            if positive < half {
+                scratch.half[positive] += lag;
+            }
+            let negative = (padded - positive) % padded;
+            if m > 0 && negative < half {
+                scratch.half[negative] += lag.conj();
             }
         }
         scratch.half[0].im = 0.0;

@@ -1,10 +1,10 @@
 //! The first lags of the biased correlogram of unweighted windows, slid along a record.
 //!
 //! Computes r_m = (1/N) sum over n of s(n+m) conj(s(n)) for m = 0 .. L-1, what CA of order L - 1 needs. The products of
-//! a lag are summed in blocks as long as a window has products, from each place to the end of its block and from the
-//! start to each place; every window is the sum of two of these (van Herk 1992). Three operations a product instead
-//! of N, and nothing is ever subtracted: a window knows of no sample but its own, so that neither rounding nor a burst
-//! nor a missing sample reaches another one. Check: against the sum written out, beside bursts and fill values.
+//! a lag are summed in blocks as long as a window has products, from each product to the end of its block and from the
+//! start to each product; every window is the sum of two of these (van Herk 1992). Three operations a product instead
+//! of N, and nothing is ever subtracted: the lags of a window depend on its own samples only, so that neither rounding nor a burst
+//! nor a missing sample affects another one. Check: against the sum written out, beside bursts and fill values.
 
 use std::marker::PhantomData;
 
@@ -53,16 +53,18 @@ impl<S: Sample> ShortCorrelogram<S> {
     /// length in the whole record, of which this one is the part from `first_sample` on.
     fn evaluate_all(&self, record: &[S], first_sample: usize, step: usize, out: &mut [f64]) {
         let numbers = S::KIND.lag_numbers(self.lags);
-        let (per_lag, share) = (S::KIND.lag_numbers(1), 1.0 / self.window_samples as f64);
-        let (mut products, mut running) = (Vec::new(), Running::default());
+        let per_lag = S::KIND.lag_numbers(1);
+        let factor = 1.0 / self.window_samples as f64;
+        let mut products = Vec::new();
+        let mut running = RunningSums::default();
         for m in 0..self.lags {
             let length = self.window_samples - m;
+            let skipped = first_sample % length;
             for part in 0..per_lag {
                 form_products(&record[m..], record, part, &mut products);
-                running.form(&products, first_sample % length, length);
+                running.form(&products, skipped, length);
                 for (gate, lags) in out.chunks_mut(numbers).enumerate() {
-                    lags[per_lag * m + part] =
-                        running.of(gate * step, first_sample % length, length) * share;
+                    lags[per_lag * m + part] = running.sum(gate * step, skipped, length) * factor;
                 }
             }
         }
@@ -79,13 +81,13 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
     }
 
     fn evaluate(&self, window: &[S], _: &mut Scratch, out: &mut [f64]) {
-        let share = 1.0 / self.window_samples as f64;
+        let factor = 1.0 / self.window_samples as f64;
         for (m, parts) in out.chunks_mut(S::KIND.lag_numbers(1)).enumerate() {
             let products = window[m..]
                 .iter()
                 .zip(window)
                 .map(|(a, b)| a.to_complex() * b.to_complex().conj());
-            let mean = products.sum::<num_complex::Complex<f64>>() * share;
+            let mean = products.sum::<num_complex::Complex<f64>>() * factor;
             parts.copy_from_slice(&[mean.re, mean.im][..parts.len()]);
         }
     }
@@ -99,73 +101,76 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
         scratch: &mut Scratch,
         each: &mut dyn FnMut(usize, &[f64]),
     ) {
-        let (n, numbers) = (self.window_samples, self.statistic_len());
+        let n = self.window_samples;
+        let numbers = self.statistic_len();
         let windows = record.windows(n).step_by(step_samples);
         let mut means = vec![0.0; windows.len() * numbers];
         // far apart, windows are cheaper one by one
         if 3 * step_samples <= n && !means.is_empty() {
             self.evaluate_all(record, first_sample, step_samples, &mut means);
         } else {
-            windows
-                .zip(means.chunks_mut(numbers))
-                .for_each(|(window, mean)| self.evaluate(window, scratch, mean));
+            for (window, mean) in windows.zip(means.chunks_mut(numbers)) {
+                self.evaluate(window, scratch, mean);
+            }
         }
-        let means = means.chunks(numbers).enumerate();
-        means
-            .filter(|(gate, _)| valid(*gate))
-            .for_each(|(gate, mean)| each(gate, mean));
+        for (gate, mean) in means.chunks(numbers).enumerate() {
+            if valid(gate) {
+                each(gate, mean);
+            }
+        }
     }
 }
 
 /// Real parts (`part` 0) or imaginary parts of the products `ahead[k]` conj `behind[k]`.
 fn form_products<S: Sample>(ahead: &[S], behind: &[S], part: usize, products: &mut Vec<f64>) {
-    let pairs = ahead
-        .iter()
-        .zip(behind)
-        .map(|(a, b)| (a.to_complex(), b.to_complex()));
     products.clear();
-    match (S::KIND, part) {
-        (SignalKind::Real, _) => products.extend(pairs.map(|(a, b)| a.re * b.re)),
-        (SignalKind::Complex, 0) => products.extend(pairs.map(|(a, b)| a.re * b.re + a.im * b.im)),
-        (SignalKind::Complex, _) => products.extend(pairs.map(|(a, b)| a.im * b.re - a.re * b.im)),
+    for (a, b) in ahead.iter().zip(behind) {
+        let a = a.to_complex();
+        let b = b.to_complex();
+        products.push(match (S::KIND, part) {
+            (SignalKind::Real, _) => a.re * b.re,
+            (SignalKind::Complex, 0) => a.re * b.re + a.im * b.im,
+            (SignalKind::Complex, _) => a.im * b.re - a.re * b.im,
+        });
     }
 }
 
 /// Running sums of the products of one lag.
 #[derive(Default)]
-struct Running {
-    /// From the start of the block to each place.
+struct RunningSums {
+    /// From the start of the block to each product.
     to: Vec<f64>,
-    /// From each place to the end of the block.
+    /// From each product to the end of the block.
     from: Vec<f64>,
 }
 
-impl Running {
+impl RunningSums {
     /// Forms the sums in blocks of `length` products, of the first of which `skipped` are missing.
     fn form(&mut self, products: &[f64], skipped: usize, length: usize) {
         self.to.clear();
         self.from.clear();
         self.from.resize(products.len(), 0.0);
-        let (first, rest) = products.split_at((length - skipped).min(products.len()));
-        let (first_from, rest_from) = self.from.split_at_mut(first.len());
-        let blocks = std::iter::once((first, first_from))
-            .chain(rest.chunks(length).zip(rest_from.chunks_mut(length)));
-        for (block, from) in blocks {
+        let mut start = 0;
+        let mut end = (length - skipped).min(products.len());
+        while start < products.len() {
+            let block = &products[start..end];
             let mut sum = 0.0;
-            self.to.extend(block.iter().map(|product| {
+            for product in block {
                 sum += product;
-                sum
-            }));
+                self.to.push(sum);
+            }
             let mut sum = 0.0;
-            for (from, product) in from.iter_mut().zip(block).rev() {
+            for (from, product) in self.from[start..end].iter_mut().zip(block).rev() {
                 sum += product;
                 *from = sum;
             }
+            start = end;
+            end = (end + length).min(products.len());
         }
     }
 
     /// Sum of the `length` products from `start` on.
-    fn of(&self, start: usize, skipped: usize, length: usize) -> f64 {
+    fn sum(&self, start: usize, skipped: usize, length: usize) -> f64 {
         let end = self.to[start + length - 1];
         if (start + skipped).is_multiple_of(length) {
             end

@@ -1,4 +1,4 @@
-//! Power spectrum of zero-padded samples and its way back to lags: the transform behind every correlogram.
+//! Power spectrum of zero-padded samples and its inverse transform to lags: the transform behind every correlogram.
 //!
 //! Computes |sum s(n) exp(-2 pi i k n / M)|^2 of weighted samples s. Check: correlograms and spectra against the sums written out.
 
@@ -39,10 +39,8 @@ impl WindowTransform {
         match kind {
             SignalKind::Real => {
                 let mut planner = RealFftPlanner::new();
-                let (forward, inverse) = (
-                    planner.plan_fft_forward(padded),
-                    planner.plan_fft_inverse(padded),
-                );
+                let forward = planner.plan_fft_forward(padded);
+                let inverse = planner.plan_fft_inverse(padded);
                 let inner = forward.get_scratch_len().max(inverse.get_scratch_len());
                 Self {
                     plans: Plans::Real(forward, inverse),

@@ -43,16 +43,19 @@ impl ZoomSpectrum {
                 field: "frequency_hz",
             });
         };
-        frequency_hz
-            .iter()
-            .try_for_each(|&f_hz| finite("frequency_hz", f_hz))?;
-        let padding = frequency_hz.len().next_multiple_of(LANES) - frequency_hz.len();
-        let padded = frequency_hz
-            .iter()
-            .chain(std::iter::repeat_n(last_hz, padding));
-        let (sin, cos) = padded
-            .map(|f_hz| (std::f64::consts::TAU * f_hz / sampling.sample_rate_hz).sin_cos())
-            .unzip();
+        for &f_hz in frequency_hz {
+            finite("frequency_hz", f_hz)?;
+        }
+        let padded = frequency_hz.len().next_multiple_of(LANES);
+        let mut sin = Vec::with_capacity(padded);
+        let mut cos = Vec::with_capacity(padded);
+        for index in 0..padded {
+            let f_hz = frequency_hz.get(index).unwrap_or(last_hz);
+            let turn = std::f64::consts::TAU * f_hz / sampling.sample_rate_hz;
+            let (sine, cosine) = turn.sin_cos();
+            sin.push(sine);
+            cos.push(cosine);
+        }
         Ok(Self {
             kind,
             lags,
@@ -92,7 +95,8 @@ fn clenshaw(lags: &[f64], cos: &[f64], out: &mut [f64]) {
         for i in 0..LANES {
             twice[i] = 2.0 * cos[i];
         }
-        let (mut next, mut after) = ([0.0; LANES], [0.0; LANES]);
+        let mut next = [0.0; LANES];
+        let mut after = [0.0; LANES];
         for &lag in lags[1..].iter().rev() {
             for i in 0..LANES {
                 let here = (lag - after[i]) + twice[i] * next[i];
@@ -113,10 +117,12 @@ fn horner(lags: &[f64], cos: &[f64], sin: &[f64], out: &mut [f64]) {
     let (out, _) = out.as_chunks_mut::<LANES>();
     let (pairs, _) = lags.as_chunks::<2>();
     for ((cos, sin), out) in cos.iter().zip(sin).zip(out) {
-        let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+        let mut re = [0.0; LANES];
+        let mut im = [0.0; LANES];
         for [lag_re, lag_im] in pairs[1..].iter().rev() {
             for i in 0..LANES {
-                let (x, y) = (re[i] + lag_re, im[i] + lag_im);
+                let x = re[i] + lag_re;
+                let y = im[i] + lag_im;
                 re[i] = x * cos[i] + y * sin[i];
                 im[i] = y * cos[i] - x * sin[i];
             }

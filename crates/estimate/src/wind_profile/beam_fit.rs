@@ -1,11 +1,11 @@
 //! The wind that fits radial velocities best: least squares over the beams, with the covariance of the residuals.
 //!
 //! On a cone it is the sine fit `a0 + a1 cos(az) + b1 sin(az)` of a VAD (Browning and Wexler 1968), and it needs no even spacing:
-//! beams without velocity are left out.
+//! beams without velocity are skipped.
 
 use crate::error::{Error, length};
 
-/// A wind and how well it fits.
+/// A wind and the quality of its fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WindFit {
     /// Wind in the axes of the directions \[m/s\].
@@ -28,20 +28,20 @@ impl WindFit {
 }
 
 /// The wind that fits velocities \[m/s\], positive away from the lidar, along unit vectors; NaN is no velocity. `None` if the
-/// beams that have one do not tell three components apart.
+/// beams that have one do not determine three components.
 ///
 /// # Errors
 /// [`Error::Length`] if there is not one velocity for each direction.
 pub fn fit_wind(direction: &[[f64; 3]], velocity_m_s: &[f64]) -> Result<Option<WindFit>, Error> {
     length("velocity_m_s", direction.len(), velocity_m_s.len())?;
-    let known = || {
-        direction
-            .iter()
-            .zip(velocity_m_s)
-            .filter(|(_, v)| v.is_finite())
-    };
-    let (mut normal, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
-    for (e, v) in known() {
+    let mut normal = [[0.0; 3]; 3];
+    let mut right = [0.0; 3];
+    let mut beams = 0;
+    for (e, v) in direction.iter().zip(velocity_m_s) {
+        if !v.is_finite() {
+            continue;
+        }
+        beams += 1;
         for i in 0..3 {
             right[i] += e[i] * v;
             for j in 0..3 {
@@ -52,18 +52,20 @@ pub fn fit_wind(direction: &[[f64; 3]], velocity_m_s: &[f64]) -> Result<Option<W
     let Some(unit_covariance) = inverse(&normal) else {
         return Ok(None);
     };
-    let velocity_m_s = unit_covariance.map(|row| dot(row, right));
-    let beams = known().count();
-    let squares: f64 = known()
-        .map(|(e, v)| (v - dot(*e, velocity_m_s)).powi(2))
-        .sum();
+    let wind_m_s = unit_covariance.map(|row| dot(row, right));
+    let mut squares = 0.0;
+    for (e, v) in direction.iter().zip(velocity_m_s) {
+        if v.is_finite() {
+            squares += (v - dot(*e, wind_m_s)).powi(2);
+        }
+    }
     let residual_m_s = if beams > 3 {
         (squares / (beams - 3) as f64).sqrt()
     } else {
         f64::NAN
     };
     Ok(Some(WindFit {
-        velocity_m_s,
+        velocity_m_s: wind_m_s,
         unit_covariance,
         residual_m_s,
         beams,
@@ -79,12 +81,21 @@ const SINGULAR: f64 = 1e-12;
 
 /// The inverse of a symmetric matrix by its adjugate, if its columns span space.
 fn inverse(m: &[[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
-    let minor = |i: usize, j: usize| {
-        let ([a, b], [c, d]) = ([(i + 1) % 3, (i + 2) % 3], [(j + 1) % 3, (j + 2) % 3]);
-        m[a][c] * m[b][d] - m[a][d] * m[b][c]
-    };
-    let determinant: f64 = (0..3).map(|j| m[0][j] * minor(0, j)).sum();
+    let mut determinant = 0.0;
+    for j in 0..3 {
+        determinant += m[0][j] * cofactor(m, 0, j);
+    }
     let trace = m[0][0] + m[1][1] + m[2][2];
     let regular = determinant > SINGULAR * trace.powi(3);
-    regular.then(|| std::array::from_fn(|i| std::array::from_fn(|j| minor(j, i) / determinant)))
+    regular
+        .then(|| std::array::from_fn(|i| std::array::from_fn(|j| cofactor(m, j, i) / determinant)))
+}
+
+/// Cofactor of the element (i, j) of a matrix.
+fn cofactor(m: &[[f64; 3]; 3], i: usize, j: usize) -> f64 {
+    let a = (i + 1) % 3;
+    let b = (i + 2) % 3;
+    let c = (j + 1) % 3;
+    let d = (j + 2) % 3;
+    m[a][c] * m[b][d] - m[a][d] * m[b][c]
 }

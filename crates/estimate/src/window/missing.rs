@@ -1,7 +1,7 @@
-//! Which samples are no measurements: not finite, fill values, and those that dwarf all others.
+//! Missing samples: not finite, fill values, and those that dwarf all others.
 //!
-//! A window that holds one is left out. What is left is scaled by a power of two, so that amplitudes of 1e-200 and 1e200
-//! keep their velocity to the last bit. Check: windows without such a sample keep every bit of a record without it.
+//! A window that holds one is skipped. The remaining samples are scaled by a power of two, so that amplitudes of 1e-200 and 1e200
+//! have the same velocity to the last bit. Check: windows without such a sample have the same bits as in a record without it.
 
 use crate::window::{Gates, Sample};
 
@@ -14,8 +14,8 @@ const GAP: usize = 20;
 /// sample is enough.
 pub const FILL_VALUES: [f64; 2] = [-9999.0, 15.0 * (1_u128 << 119) as f64];
 
-/// How many samples there are of each binary order of magnitude: it tells which are outsized where the samples of a scan come
-/// piece by piece.
+/// Number of samples of each binary order of magnitude, from which outsized samples are found where those of a scan arrive piece by
+/// piece.
 #[derive(Debug, Clone)]
 pub struct SampleSizes {
     counts: Vec<usize>,
@@ -33,7 +33,7 @@ impl Default for SampleSizes {
 }
 
 impl SampleSizes {
-    /// Counts a sample by the size of its largest part; 0 and what is not finite are none.
+    /// Counts a sample by the size of its largest part, unless that is 0 or not finite.
     pub fn add(&mut self, size: f64) {
         if size > 0.0 && size.is_finite() {
             let order = (size.to_bits() >> 52) as usize;
@@ -49,14 +49,13 @@ impl SampleSizes {
     #[must_use]
     pub fn outsized(&self) -> f64 {
         let all: usize = self.counts.iter().sum();
-        let (mut above, mut last, mut limit) = (0, None, f64::INFINITY);
-        for (order, count) in self
-            .counts
-            .iter()
-            .enumerate()
-            .rev()
-            .filter(|(_, count)| **count > 0)
-        {
+        let mut above = 0;
+        let mut last = None;
+        let mut limit = f64::INFINITY;
+        for (order, &count) in self.counts.iter().enumerate().rev() {
+            if count == 0 {
+                continue;
+            }
             if let Some(last) = last
                 && last - order > GAP
                 && 2 * above < all
@@ -72,39 +71,43 @@ impl SampleSizes {
     /// The largest sample below `limit`; 0 if there is none.
     #[must_use]
     pub fn largest_below(&self, limit: f64) -> f64 {
-        self.largest
-            .iter()
-            .copied()
-            .filter(|size| *size < limit)
-            .fold(0.0, f64::max)
+        let mut largest: f64 = 0.0;
+        for &size in &self.largest {
+            if size < limit {
+                largest = largest.max(size);
+            }
+        }
+        largest
     }
 }
 
-/// Tells measured samples from missing ones.
+/// Which samples are missing.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rule {
+pub(crate) struct MissingRule {
     fill: &'static [f64],
     /// Samples of this size and above are missing.
     limit: f64,
 }
 
-impl Rule {
+impl MissingRule {
     /// Only samples that are not finite are missing.
     pub(crate) const NOT_FINITE: Self = Self {
         fill: &[],
         limit: f64::INFINITY,
     };
 
-    /// For a set of samples: [`FILL_VALUES`] are missing, and those that dwarf the others ([`SampleSizes::outsized`]).
-    pub(crate) fn of<S: Sample>(samples: impl Iterator<Item = S>) -> Self {
+    /// The rule for a set of samples: [`FILL_VALUES`] are missing, and those that dwarf the others ([`SampleSizes::outsized`]).
+    pub(crate) fn from_samples<S: Sample>(samples: impl Iterator<Item = S>) -> Self {
         let filled = Self {
             fill: &FILL_VALUES,
             limit: f64::INFINITY,
         };
         let mut sizes = SampleSizes::default();
-        samples
-            .filter(|sample| filled.is_measured(*sample))
-            .for_each(|sample| sizes.add(sample.largest_part()));
+        for sample in samples {
+            if filled.is_measured(sample) {
+                sizes.add(sample.largest_part());
+            }
+        }
         Self {
             limit: sizes.outsized(),
             ..filled
@@ -121,33 +124,41 @@ impl Rule {
     ///
     /// Dividing by it is exact and brings the samples to order one, so that squares neither overflow nor vanish.
     pub(crate) fn binary_scale<S: Sample>(&self, samples: impl Iterator<Item = S>) -> Option<f64> {
-        let measured = samples.filter(|sample| self.is_measured(*sample));
-        let largest = measured.fold(0.0_f64, |largest, sample| {
-            largest.max(sample.largest_part())
-        });
+        let mut largest: f64 = 0.0;
+        for sample in samples {
+            if self.is_measured(sample) {
+                largest = largest.max(sample.largest_part());
+            }
+        }
         // clamped so that the scale and its inverse are both normal numbers
         (largest > 0.0).then(|| largest.log2().floor().clamp(-1000.0, 1000.0).exp2())
     }
 }
 
-/// Which windows of a ray hold a missing sample; `None` if no one does.
+/// Which windows of a ray hold a missing sample; `None` if the ray has none.
 pub(crate) fn invalid_windows<S: Sample>(
     samples: impl Iterator<Item = S>,
-    rule: &Rule,
+    rule: &MissingRule,
     gates: &Gates,
     count: usize,
 ) -> Option<Vec<bool>> {
-    let missing = samples
-        .enumerate()
-        .filter(|(_, sample)| !rule.is_measured(*sample));
-    let bad: Vec<usize> = missing.map(|(index, _)| index).collect();
-    let invalid = |gate: usize| {
+    let mut missing = Vec::new();
+    for (index, sample) in samples.enumerate() {
+        if !rule.is_measured(sample) {
+            missing.push(index);
+        }
+    }
+    if missing.is_empty() {
+        return None;
+    }
+    let mut invalid = Vec::with_capacity(count);
+    for gate in 0..count {
         let start = gate * gates.step_samples;
-        let next = bad.partition_point(|index| *index < start);
-        bad.get(next)
-            .is_some_and(|index| *index < start + gates.window_samples)
-    };
-    (!bad.is_empty()).then(|| (0..count).map(invalid).collect())
+        let next = missing.partition_point(|index| *index < start);
+        let first_missing = missing.get(next);
+        invalid.push(first_missing.is_some_and(|index| *index < start + gates.window_samples));
+    }
+    Some(invalid)
 }
 
 #[cfg(test)]
@@ -156,7 +167,7 @@ mod tests {
     use num_complex::Complex;
 
     fn measured(samples: &[f64]) -> Vec<bool> {
-        let rule = Rule::of(samples.iter().copied());
+        let rule = MissingRule::from_samples(samples.iter().copied());
         samples
             .iter()
             .map(|sample| rule.is_measured(*sample))
@@ -192,14 +203,14 @@ mod tests {
         // the larger ones are the more: the small ones are residues of rounding
         assert_eq!(measured(&[1e-17, 1.0, -1.0, 0.5]), [true; 4]);
         assert_eq!(measured(&[0.0, 5.0]), [true; 2]);
-        let all = Rule::NOT_FINITE;
+        let all = MissingRule::NOT_FINITE;
         assert!(all.is_measured(1e308) && !all.is_measured(f64::NAN));
     }
 
     #[test]
     fn scale_is_a_power_of_two_next_to_the_largest_sample() {
         fn scale<S: Sample>(samples: &[S]) -> f64 {
-            Rule::of(samples.iter().copied())
+            MissingRule::from_samples(samples.iter().copied())
                 .binary_scale(samples.iter().copied())
                 .unwrap_or(1.0)
         }

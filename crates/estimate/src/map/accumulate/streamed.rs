@@ -1,4 +1,4 @@
-//! The sums over the windows of a scan whose records come piece by piece: memory does not grow with the number of pulses.
+//! The sums over the windows of a scan whose records arrive piece by piece: memory does not grow with the number of pulses.
 //!
 //! The windows of a line are added in the order of its rays, whatever the pieces, and all scales are powers of two, so the
 //! sums have the same bits as if all records were there at once. Check: that, for pieces of several sizes, with the loudest
@@ -15,10 +15,10 @@ use crate::error::{Error, check, length};
 use crate::estimators::Statistic;
 use crate::map::ScanGeometry;
 use crate::parallel::{for_each_chunk, map_each};
-use crate::window::missing::{Rule, invalid_windows};
+use crate::window::missing::{MissingRule, invalid_windows};
 use crate::window::{Gates, Sample, Scratch};
 
-/// Statistics of the windows of a scan, as far as its records have come.
+/// Statistics of the windows of those records of a scan that have been added.
 ///
 /// Memory: that of [`Scan`], and a few bytes for each window of a record with a sample that is not finite.
 pub struct ScanSums<'s, S, T: ?Sized> {
@@ -31,7 +31,7 @@ pub struct ScanSums<'s, S, T: ?Sized> {
     numbers: usize,
     /// Statistics of each gate held, the pulses of a line added.
     rows: Vec<f64>,
-    rule: Rule,
+    rule: MissingRule,
     invalid: BTreeMap<usize, Vec<bool>>,
     /// Power of two by which the samples were divided; none before the first that is not 0.
     scale: Option<f64>,
@@ -39,8 +39,8 @@ pub struct ScanSums<'s, S, T: ?Sized> {
 }
 
 impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
-    /// No record yet; the rays of `geometry` will have records of `record_samples` samples. Missing are samples that are not
-    /// finite; to find those that dwarf all others takes all records, as [`Scan::new`] has them.
+    /// Starts without records; the rays of `geometry` will have records of `record_samples` samples. Samples that are not finite are
+    /// missing; only [`Scan::new`], which has all records, also finds those that dwarf all others.
     ///
     /// # Errors
     /// [`Error::Length`] if statistic and gates have windows of different lengths; as [`Gates::count`].
@@ -63,8 +63,8 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         })
     }
 
-    /// The same for some gates of the records, whose samples [`Gates::samples`] tells: regions hold windows of these gates alone.
-    /// Those that lie within them have the bits that they have in the sums of whole records.
+    /// Starts sums over the gates `held` alone, from records of the samples [`Gates::samples`] of these gates: regions hold windows of
+    /// these gates only. Regions that lie within them have the same bits as in the sums of whole records.
     ///
     /// # Errors
     /// As [`ScanSums::new`]; [`Error::OutOfRange`] for gates that the geometry does not have.
@@ -76,36 +76,33 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     ) -> Result<Self, Error> {
         length("window", statistic.window_samples(), gates.window_samples)?;
         let allowed = "behind their start, at most the gates of a record";
-        let are_there = !held.is_empty() && held.end <= geometry.gates();
-        check("end of the gates", held.end as f64, allowed, are_there)?;
-        let (record_samples, numbers) = (gates.samples(&held).len(), statistic.statistic_len());
-        let rows = vec![0.0; geometry.line_elevation_rad().len() * held.len() * numbers];
-        let (invalid, gates, scale, sample) = (BTreeMap::new(), *gates, None, PhantomData);
-        let rule = Rule::NOT_FINITE;
+        let exist = !held.is_empty() && held.end <= geometry.gates();
+        check("end of the gates", held.end as f64, allowed, exist)?;
+        let numbers = statistic.statistic_len();
         Ok(Self {
             statistic,
-            gates,
+            gates: *gates,
+            record_samples: gates.samples(&held).len(),
+            numbers,
+            rows: vec![0.0; geometry.line_elevation_rad().len() * held.len() * numbers],
             geometry,
             held,
-            record_samples,
-            numbers,
-            rows,
-            rule,
-            invalid,
-            scale,
-            sample,
+            rule: MissingRule::NOT_FINITE,
+            invalid: BTreeMap::new(),
+            scale: None,
+            sample: PhantomData,
         })
     }
 
-    /// The same with a rule for missing samples.
-    pub(super) fn with_rule(self, rule: Rule) -> Self {
+    /// Replaces the rule for missing samples.
+    pub(super) fn with_rule(self, rule: MissingRule) -> Self {
         Self { rule, ..self }
     }
 
-    /// The same with the scale of samples up to `largest`: parts of a scan that are summed apart have the bits of the whole.
+    /// Sets the scale to that of samples up to `largest`, so that parts of a scan that are summed separately have the bits of the whole.
     #[must_use]
     pub fn scaled_for(mut self, largest: f64) -> Self {
-        self.scale = Rule::NOT_FINITE.binary_scale(std::iter::once(largest));
+        self.scale = MissingRule::NOT_FINITE.binary_scale(std::iter::once(largest));
         self
     }
 
@@ -119,25 +116,23 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         let (rays, samples) = records.dim();
         length("samples of a record", self.record_samples, samples)?;
         let scale = self.rescale(records);
-        let (gates, rule, count) = (&self.gates, &self.rule, self.held.len());
-        let found = map_each(rays, |ray| {
+        let gates = &self.gates;
+        let rule = &self.rule;
+        let count = self.held.len();
+        let invalid_of_rays = map_each(rays, |ray| {
             invalid_windows(records.row(ray).iter().copied(), rule, gates, count)
         });
-        let found = found
-            .into_iter()
-            .enumerate()
-            .filter_map(|(ray, invalid)| Some((first_ray + ray, invalid?)));
-        self.invalid.extend(found);
-        let (statistic, invalid, lines, numbers) = (
-            self.statistic,
-            &self.invalid,
-            &self.geometry.rays,
-            self.numbers,
-        );
-        let (piece, first_sample) = (
-            first_ray..first_ray + rays,
-            self.held.start * gates.step_samples,
-        );
+        for (ray, windows) in invalid_of_rays.into_iter().enumerate() {
+            if let Some(windows) = windows {
+                self.invalid.insert(first_ray + ray, windows);
+            }
+        }
+        let statistic = self.statistic;
+        let invalid = &self.invalid;
+        let lines = &self.geometry.rays;
+        let numbers = self.numbers;
+        let piece = first_ray..first_ray + rays;
+        let first_sample = self.held.start * gates.step_samples;
         for_each_chunk(
             &mut self.rows,
             count * numbers,
@@ -145,24 +140,19 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
             |(scratch, row), line, chunk| {
                 for ray in lines.within(line, &piece) {
                     row.clear();
-                    row.extend(
-                        records
-                            .row(ray - first_ray)
-                            .iter()
-                            .map(|s| s.scaled(scale.recip())),
-                    );
-                    let invalid = invalid.get(&ray);
-                    let valid = |gate: usize| !invalid.is_some_and(|invalid| invalid[gate]);
-                    let mut sum = |gate: usize, one: &[f64]| {
-                        add(&mut chunk[gate * numbers..][..numbers], one)
-                    };
+                    for sample in records.row(ray - first_ray) {
+                        row.push(sample.scaled(scale.recip()));
+                    }
+                    let windows = invalid.get(&ray);
                     statistic.evaluate_record(
                         row,
                         first_sample,
                         gates.step_samples,
-                        &valid,
+                        &|gate| windows.is_none_or(|invalid| !invalid[gate]),
                         scratch,
-                        &mut sum,
+                        &mut |gate, of_window| {
+                            add(&mut chunk[gate * numbers..][..numbers], of_window);
+                        },
                     );
                 }
             },
@@ -170,13 +160,15 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         Ok(())
     }
 
-    /// The scale for these records and those before; the sums are brought to it.
+    /// The scale for these records and the earlier ones, to which the sums are converted.
     fn rescale(&mut self, records: ArrayView2<'_, S>) -> f64 {
         let here = self.rule.binary_scale(records.iter().copied());
         let scale = match (self.scale, here) {
             (Some(before), Some(here)) if here > before => {
-                let share = (before / here).powi(2);
-                self.rows.iter_mut().for_each(|sum| *sum *= share);
+                let factor = (before / here).powi(2);
+                for sum in &mut self.rows {
+                    *sum *= factor;
+                }
                 here
             }
             (Some(before), _) => before,
@@ -187,7 +179,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         scale
     }
 
-    /// The scan of the records that have come, ready to be averaged over any region.
+    /// The scan of the records that were added, ready to be averaged over any region.
     #[must_use]
     pub fn finish(self) -> Scan {
         let Self {
@@ -199,7 +191,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
             scale,
             ..
         } = self;
-        // Blocks have the same gates whatever is held.
+        // Blocks have the same gates whichever gates are stored.
         let skipped = (held.start.next_multiple_of(BLOCK) - held.start).min(held.len());
         let line_numbers = held.len() * numbers;
         let line_blocks = (held.len() - skipped).div_ceil(BLOCK) * numbers;
@@ -212,7 +204,9 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
                 let rows =
                     &rows[line * line_numbers + skipped * numbers..(line + 1) * line_numbers];
                 for (sum, rows) in chunk.chunks_mut(numbers).zip(rows.chunks(BLOCK * numbers)) {
-                    rows.chunks(numbers).for_each(|row| add(sum, row));
+                    for row in rows.chunks(numbers) {
+                        add(sum, row);
+                    }
                 }
             },
         );
@@ -230,7 +224,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     }
 }
 
-/// Valid windows before each gate held, for all lines.
+/// Valid windows before each stored gate, for all lines.
 fn valid_before(
     geometry: &ScanGeometry,
     gates: usize,
@@ -239,10 +233,10 @@ fn valid_before(
     let lines = geometry.line_elevation_rad().len();
     let mut counts = Vec::with_capacity(lines * (gates + 1));
     for line in 0..lines {
-        let rays_with_invalid = geometry.line_rays(line).take_while(|_| !invalid.is_empty());
-        let broken: Vec<&Vec<bool>> = rays_with_invalid
-            .filter_map(|ray| invalid.get(&ray))
-            .collect();
+        let mut broken: Vec<&Vec<bool>> = Vec::new();
+        if !invalid.is_empty() {
+            broken.extend(geometry.line_rays(line).filter_map(|ray| invalid.get(&ray)));
+        }
         let rays = geometry.rays.count(line);
         let mut before = 0;
         counts.push(0);

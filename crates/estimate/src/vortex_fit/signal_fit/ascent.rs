@@ -1,4 +1,4 @@
-//! The ascent to a top of the likelihood of raw signals.
+//! The ascent to a maximum of the likelihood of raw signals.
 //!
 //! The few lines through the cores make the likelihood of one scan curve quite differently from its mean over scans, so the
 //! information serves only as the first curvature; it is then corrected from gradient to gradient.
@@ -17,7 +17,7 @@ use crate::vortex_fit::{PARAMETERS, Powers, ScanModel, ScanSignals, SignalFitOpt
 /// A wake and the powers of signal and noise.
 pub(crate) type State = (Wake, Powers);
 
-/// What lines that are left out of a model would add to ln p about a state, to second order.
+/// Contribution to ln p about a state of the lines that a model omits, to second order.
 #[derive(Debug, Clone)]
 pub(crate) struct Parabola {
     pub(crate) about: State,
@@ -27,12 +27,12 @@ pub(crate) struct Parabola {
     pub(crate) information: Array2<f64>,
 }
 
-/// ln p of the free numbers, and how they are climbed.
+/// ln p of the free numbers and its ascent.
 pub(crate) struct Ascent<'a> {
     pub(crate) model: &'a ScanModel,
     pub(crate) signals: &'a ScanSignals,
     pub(crate) options: &'a SignalFitOptions,
-    /// The lines that the model leaves out.
+    /// The lines that the model omits.
     pub(crate) others: Option<Parabola>,
 }
 
@@ -53,17 +53,20 @@ impl Ascent<'_> {
 
     /// The free numbers of `to`, counted from `from`.
     pub(crate) fn steps(&self, from: &State, to: &State) -> Vec<f64> {
-        let (a, b) = (numbers(from), numbers(to));
-        self.groups()
-            .iter()
-            .map(|group| b[group[0]] - a[group[0]])
-            .collect()
+        let from = numbers(from);
+        let to = numbers(to);
+        let mut steps = Vec::new();
+        for group in self.groups() {
+            steps.push(to[group[0]] - from[group[0]]);
+        }
+        steps
     }
 
     /// ln p and its gradient by the free numbers; nothing where the model does not exist.
     pub(crate) fn value(&self, state: &State) -> Option<(f64, Vec<f64>)> {
         let value = self.model.log_likelihood(self.signals, &state.0, state.1)?;
-        let slopes: Vec<f64> = value.by_wake.into_iter().chain(value.by_powers).collect();
+        let mut slopes = value.by_wake.to_vec();
+        slopes.extend(value.by_powers);
         let groups = self.groups();
         let mut gradient = vec![0.0; groups.len()];
         gathered(&groups, &slopes, &mut gradient);
@@ -72,16 +75,14 @@ impl Ascent<'_> {
             let away = self.steps(&others.about, state);
             let pull = times(&others.information, &away);
             log_likelihood += dot(&others.gradient, &away) - 0.5 * dot(&pull, &away);
-            gradient
-                .iter_mut()
-                .zip(&others.gradient)
-                .zip(&pull)
-                .for_each(|((g, o), p)| *g += o - p);
+            for (index, slope) in gradient.iter_mut().enumerate() {
+                *slope += others.gradient[index] - pull[index];
+            }
         }
         Some((log_likelihood, gradient))
     }
 
-    /// Information on the free numbers, from every so-manyth line of the model.
+    /// Information on the free numbers, from every `stride`-th line of the model.
     pub(crate) fn information(
         &self,
         (wake, powers): &State,
@@ -101,7 +102,7 @@ impl Ascent<'_> {
         Ok(information)
     }
 
-    /// Goes to the top of the likelihood.
+    /// Climbs to a maximum of the likelihood; returns the state and its ln p.
     ///
     /// # Errors
     /// [`Error::NotConverged`]; [`Error::Linalg`] if a covariance is not positive definite.
@@ -109,73 +110,75 @@ impl Ascent<'_> {
         let mut curvature = self.information(&start, self.options.information_stride)?;
         let origin = vec![0.0; curvature.nrows()];
         let mut last: Option<(Vec<f64>, Vec<f64>)> = None;
-        let evaluate = |x: &Vec<f64>| {
-            let (log_likelihood, mut gradient) = self.value(&self.stepped(&start, x))?;
-            gradient.iter_mut().for_each(|g| *g = -*g);
-            if let Some((x_before, gradient_before)) = &last {
-                let difference = |a: &[f64], b: &[f64]| -> Vec<f64> {
-                    a.iter().zip(b).map(|(a, b)| a - b).collect()
-                };
-                learn(
-                    &mut curvature,
-                    &difference(x, x_before),
-                    &difference(&gradient, gradient_before),
-                );
-            }
-            last = Some((x.clone(), gradient.clone()));
-            Some(Normal {
-                cost: -log_likelihood,
-                gradient,
-                curvature: curvature.clone(),
-            })
-        };
-        let step = |x: &Vec<f64>, step: &[f64]| x.iter().zip(step).map(|(x, s)| x + s).collect();
-        let (iterations, sigmas) = (self.options.max_iterations, self.options.tolerance_sigmas);
         let stop = Stop {
-            iterations,
-            sigmas,
+            iterations: self.options.max_iterations,
+            sigmas: self.options.tolerance_sigmas,
             learns: true,
         };
-        let end = converged(lowest(origin, stop, evaluate, step), stop)?;
+        let end = lowest(
+            origin,
+            stop,
+            |x: &Vec<f64>| {
+                let (log_likelihood, mut gradient) = self.value(&self.stepped(&start, x))?;
+                for slope in &mut gradient {
+                    *slope = -*slope;
+                }
+                if let Some((last_x, last_gradient)) = &last {
+                    let step = difference(x, last_x);
+                    let change = difference(&gradient, last_gradient);
+                    learn(&mut curvature, &step, &change);
+                }
+                last = Some((x.clone(), gradient.clone()));
+                Some(Normal {
+                    cost: -log_likelihood,
+                    gradient,
+                    curvature: curvature.clone(),
+                })
+            },
+            |x, step| x.iter().zip(step).map(|(x, s)| x + s).collect(),
+        );
+        let end = converged(end, stop)?;
         Ok((self.stepped(&start, &end.at), -end.normal.cost))
     }
 }
 
+/// a - b, element by element.
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
 /// The parameters of the wake and the logarithms of the powers.
 fn numbers((wake, powers): &State) -> Vec<f64> {
-    wake.to_array()
-        .into_iter()
-        .chain([powers.log_signal, powers.log_noise])
-        .collect()
+    let mut numbers = wake.to_array().to_vec();
+    numbers.push(powers.log_signal);
+    numbers.push(powers.log_noise);
+    numbers
 }
 
 /// A matrix times a vector.
 pub(crate) fn times(matrix: &Array2<f64>, vector: &[f64]) -> Vec<f64> {
-    matrix
-        .rows()
-        .into_iter()
-        .map(|row| dot(&row.to_vec(), vector))
-        .collect()
+    let rows = matrix.rows().into_iter();
+    rows.map(|row| dot(&row.to_vec(), vector)).collect()
 }
 
 /// Corrects the curvature so that it explains the change `y` of the gradient over the step `s`: the update of Broyden, Fletcher,
 /// Goldfarb and Shanno, damped after Powell (1978) so that it stays positive definite.
 fn learn(curvature: &mut Array2<f64>, s: &[f64], y: &[f64]) {
     let hs = times(curvature, s);
-    let (shs, sy) = (dot(s, &hs), dot(s, y));
+    let shs = dot(s, &hs);
+    let sy = dot(s, y);
     if shs <= 0.0 {
         return;
     }
-    let part = if sy >= 0.2 * shs {
+    let fraction = if sy >= 0.2 * shs {
         1.0
     } else {
         0.8 * shs / (shs - sy)
     };
-    let r: Vec<f64> = y
-        .iter()
-        .zip(&hs)
-        .map(|(y, h)| part * y + (1.0 - part) * h)
-        .collect();
+    let mut r = Vec::with_capacity(y.len());
+    for (y, h) in y.iter().zip(&hs) {
+        r.push(fraction * y + (1.0 - fraction) * h);
+    }
     let sr = dot(s, &r);
     for ((i, j), c) in curvature.indexed_iter_mut() {
         *c += r[i] * r[j] / sr - hs[i] * hs[j] / shs;

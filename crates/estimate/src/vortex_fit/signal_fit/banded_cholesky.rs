@@ -17,16 +17,13 @@ pub(crate) struct Banded {
     pub(crate) im: Vec<f64>,
 }
 
-/// target -= source * conj(factor), in split parts.
+/// target -= source * conj(a + i b), real and imaginary parts apart.
 #[inline(always)]
-fn subtract(target: (&mut [f64], &mut [f64]), source: (&[f64], &[f64]), (a, b): (f64, f64)) {
-    let n = target.0.len();
-    let (tr, ti, sr, si) = (
-        &mut target.0[..n],
-        &mut target.1[..n],
-        &source.0[..n],
-        &source.1[..n],
-    );
+fn subtract(tr: &mut [f64], ti: &mut [f64], sr: &[f64], si: &[f64], a: f64, b: f64) {
+    let n = tr.len();
+    let ti = &mut ti[..n];
+    let sr = &sr[..n];
+    let si = &si[..n];
     for i in 0..n {
         tr[i] -= sr[i] * a + si[i] * b;
         ti[i] -= si[i] * a - sr[i] * b;
@@ -36,24 +33,24 @@ fn subtract(target: (&mut [f64], &mut [f64]), source: (&[f64], &[f64]), (a, b): 
 impl Banded {
     /// Makes room for an order and a number of subdiagonals; all entries 0.
     pub(crate) fn reset(&mut self, order: usize, width: usize) {
-        (self.order, self.width) = (order, width.min(order.saturating_sub(1)));
+        self.order = order;
+        self.width = width.min(order.saturating_sub(1));
         for part in [&mut self.re, &mut self.im] {
             part.clear();
             part.resize(order * (self.width + 1), 0.0);
         }
     }
 
-    /// Place of the entry (column + down, column).
+    /// Index of the entry (column + down, column).
     pub(crate) fn at(&self, column: usize, down: usize) -> usize {
         column * (self.width + 1) + down
     }
 
     /// Multiplies all entries.
     pub(crate) fn scale(&mut self, factor: f64) {
-        self.re
-            .iter_mut()
-            .chain(&mut self.im)
-            .for_each(|entry| *entry *= factor);
+        for entry in self.re.iter_mut().chain(&mut self.im) {
+            *entry *= factor;
+        }
     }
 
     /// Entries of a column below and on the diagonal.
@@ -79,7 +76,8 @@ impl Banded {
 pub(crate) fn factorize(band: &mut Banded) -> Option<f64> {
     let mut log_determinant = 0.0;
     for j in 0..band.order {
-        let (start, height) = (band.at(j, 0), band.height(j));
+        let start = band.at(j, 0);
+        let height = band.height(j);
         let pivot = band.re[start];
         // also false for NaN
         if !(pivot > 0.0 && pivot.is_finite()) {
@@ -94,19 +92,15 @@ pub(crate) fn factorize(band: &mut Banded) -> Option<f64> {
         let (re_head, re_tail) = band.re.split_at_mut(start + band.width + 1);
         let (im_head, im_tail) = band.im.split_at_mut(start + band.width + 1);
         for k in 1..height {
-            let factor = (re_head[start + k], im_head[start + k]);
             let target = (k - 1) * (band.width + 1);
             let count = height - k;
             subtract(
-                (
-                    &mut re_tail[target..target + count],
-                    &mut im_tail[target..target + count],
-                ),
-                (
-                    &re_head[start + k..start + height],
-                    &im_head[start + k..start + height],
-                ),
-                factor,
+                &mut re_tail[target..target + count],
+                &mut im_tail[target..target + count],
+                &re_head[start + k..start + height],
+                &im_head[start + k..start + height],
+                re_head[start + k],
+                im_head[start + k],
             );
         }
     }
@@ -119,18 +113,20 @@ pub(crate) fn forward(band: &Banded, re: &mut [f64], im: &mut [f64], from: usize
     for j in from..to {
         let start = band.at(j, 0);
         let scale = band.re[start].recip();
-        let value = (re[j] * scale, im[j] * scale);
-        (re[j], im[j]) = value;
+        re[j] *= scale;
+        im[j] *= scale;
+        let value_re = re[j];
+        let value_im = im[j];
         let end = (j + band.height(j)).min(to);
         let count = end - j - 1;
         // x -= L value: `subtract` conjugates its factor
         subtract(
-            (&mut re[j + 1..end], &mut im[j + 1..end]),
-            (
-                &band.re[start + 1..start + 1 + count],
-                &band.im[start + 1..start + 1 + count],
-            ),
-            (value.0, -value.1),
+            &mut re[j + 1..end],
+            &mut im[j + 1..end],
+            &band.re[start + 1..start + 1 + count],
+            &band.im[start + 1..start + 1 + count],
+            value_re,
+            -value_im,
         );
     }
 }
@@ -140,14 +136,13 @@ pub(crate) fn forward(band: &Banded, re: &mut [f64], im: &mut [f64], from: usize
 pub(crate) fn inverse_into(band: &Banded, out: &mut Banded) {
     out.reset(band.order, band.width);
     let stride = band.width + 1;
-    let (mut lr, mut li, mut xr, mut xi) = (
-        vec![0.0; stride],
-        vec![0.0; stride],
-        vec![0.0; stride],
-        vec![0.0; stride],
-    );
+    let mut lr = vec![0.0; stride];
+    let mut li = vec![0.0; stride];
+    let mut xr = vec![0.0; stride];
+    let mut xi = vec![0.0; stride];
     for j in (0..band.order).rev() {
-        let (start, count) = (band.at(j, 0), band.height(j) - 1);
+        let start = band.at(j, 0);
+        let count = band.height(j) - 1;
         let scale = band.re[start].recip();
         for d in 0..count {
             lr[d] = band.re[start + 1 + d] * scale;
@@ -159,15 +154,9 @@ pub(crate) fn inverse_into(band: &Banded, out: &mut Banded) {
         for k in 0..count {
             let column = (j + 1 + k) * stride;
             let rows = count - k;
-            let (vr, vi) = (
-                &out.re[column..column + rows],
-                &out.im[column..column + rows],
-            );
-            subtract(
-                (&mut xr[k..count], &mut xi[k..count]),
-                (vr, vi),
-                (-lr[k], li[k]),
-            );
+            let vr = &out.re[column..column + rows];
+            let vi = &out.im[column..column + rows];
+            subtract(&mut xr[k..count], &mut xi[k..count], vr, vi, -lr[k], li[k]);
             let (sum_re, sum_im) =
                 conjugate_dot(&vr[1..], &vi[1..], &lr[k + 1..count], &li[k + 1..count]);
             xr[k] += sum_re;
@@ -187,8 +176,11 @@ pub(crate) fn inverse_into(band: &Banded, out: &mut Banded) {
 #[inline(always)]
 fn conjugate_dot(vr: &[f64], vi: &[f64], lr: &[f64], li: &[f64]) -> (f64, f64) {
     let n = vr.len();
-    let (vi, lr, li) = (&vi[..n], &lr[..n], &li[..n]);
-    let (mut re, mut im) = ([0.0; 4], [0.0; 4]);
+    let vi = &vi[..n];
+    let lr = &lr[..n];
+    let li = &li[..n];
+    let mut re = [0.0; 4];
+    let mut im = [0.0; 4];
     let whole = n - n % 4;
     for base in (0..whole).step_by(4) {
         for lane in 0..4 {

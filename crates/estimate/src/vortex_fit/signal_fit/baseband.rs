@@ -110,23 +110,21 @@ impl Baseband {
             1.0
         };
         let turns = self.centre_hz() * self.sampling.period_s();
-        let demodulated: Vec<Complex<f64>> = record
-            .iter()
-            .enumerate()
-            .map(|(n, sample)| {
-                let phase = n as f64 * turns;
-                sample.to_complex() * Complex::from_polar(gain, -TAU * (phase - phase.floor()))
-            })
-            .collect();
-        Ok((0..count)
-            .map(|k| {
-                self.taps
-                    .iter()
-                    .zip(&demodulated[k * self.decimation..])
-                    .map(|(h, z)| z * *h)
-                    .sum()
-            })
-            .collect())
+        let mut demodulated: Vec<Complex<f64>> = Vec::with_capacity(record.len());
+        for (n, sample) in record.iter().enumerate() {
+            let phase = n as f64 * turns;
+            let carrier = Complex::from_polar(gain, -TAU * (phase - phase.floor()));
+            demodulated.push(sample.to_complex() * carrier);
+        }
+        let mut filtered = Vec::with_capacity(count);
+        for k in 0..count {
+            let mut sum = Complex::ZERO;
+            for (h, z) in self.taps.iter().zip(&demodulated[k * self.decimation..]) {
+                sum += z * *h;
+            }
+            filtered.push(sum);
+        }
+        Ok(filtered)
     }
 
     /// Angular frequency \[rad/s\] in the baseband of a radial velocity \[m/s\].
@@ -179,7 +177,8 @@ impl Baseband {
     /// less, and a lag window, which smooths the density and keeps it positive, replaces the cut after `lags`.
     pub(crate) fn noise_covariance(&self, noise: Noise, lags: usize) -> Vec<f64> {
         let (low_hz, high_hz) = self.sampling.band_hz;
-        let (half_hz, rate_hz) = (0.5 * (high_hz - low_hz), self.sampling.sample_rate_hz);
+        let half_hz = 0.5 * (high_hz - low_hz);
+        let rate_hz = self.sampling.sample_rate_hz;
         let floor = match noise {
             Noise::White => 1.0,
             Noise::Band { floor } => floor.max(FLOOR),
@@ -192,17 +191,15 @@ impl Baseband {
                 let turn = TAU * (from_hz + (i as f64 + 0.5) * step_hz);
                 let power = density * self.gain(turn).powi(2) * step_hz / half_hz;
                 let angle = turn * self.interval_s();
-                covariance
-                    .iter_mut()
-                    .enumerate()
-                    .for_each(|(m, c)| *c += power * (angle * m as f64).cos());
+                for (m, value) in covariance.iter_mut().enumerate() {
+                    *value += power * (angle * m as f64).cos();
+                }
             }
         }
         let width = 0.25 * (lags as f64 + 1.0);
-        covariance
-            .iter_mut()
-            .enumerate()
-            .for_each(|(m, c)| *c *= (-0.5 * (m as f64 / width).powi(2)).exp());
+        for (m, value) in covariance.iter_mut().enumerate() {
+            *value *= (-0.5 * (m as f64 / width).powi(2)).exp();
+        }
         covariance
     }
 }
@@ -219,13 +216,13 @@ impl PowerGain {
     /// Gain and its change per m/s; velocities beyond the unambiguous interval fold.
     pub(crate) fn at(&self, velocity_m_s: f64) -> (f64, f64) {
         let intervals = self.values.len() - 1;
-        let place = ((velocity_m_s - self.first_m_s) / self.step_m_s).rem_euclid(intervals as f64);
-        let index = (place as usize).min(intervals - 1);
-        let (a, b) = (self.values[index], self.values[index + 1]);
-        (
-            a + (place - index as f64) * (b - a),
-            (b - a) / self.step_m_s,
-        )
+        let position =
+            ((velocity_m_s - self.first_m_s) / self.step_m_s).rem_euclid(intervals as f64);
+        let index = (position as usize).min(intervals - 1);
+        let a = self.values[index];
+        let change = self.values[index + 1] - a;
+        let value = a + (position - index as f64) * change;
+        (value, change / self.step_m_s)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Fit of the wake to all raw signals of a scan by maximum likelihood.
 //!
-//! A quasi-Newton ascent, damped as Levenberg and Marquardt do, that starts with the information of a part of the lines as
+//! A quasi-Newton ascent, damped after Levenberg and Marquardt, that starts with the information of a fraction of the lines as
 //! curvature. The covariance of the result is the inverse of the full information, which is the
 //! Cramer-Rao bound. Check: standard deviation and bias over scans against the bound.
 
@@ -19,11 +19,11 @@ use crate::vortex_fit::{
 };
 use crate::window::Sample;
 
-/// Fits that leave the surroundings of their guess start again from where they are, this often at most.
+/// Most restarts of fits that leave the neighbourhood of their guess.
 const ROUNDS: usize = 4;
-/// Where the first, rough ascent ends, in standard deviations.
+/// Tolerance of the first, rough ascent in standard deviations.
 const ROUGH_SIGMAS: f64 = 0.3;
-/// Layers of the lines on which tops are looked for, over those that the rule allows.
+/// Thickness of the layers in the search for other maxima, over that which the rule allows.
 const ROUGH_LAYERS: f64 = 2.0;
 /// Core radius of the first start over the spacing.
 const FIRST_CORE_OVER_SPACING: f64 = 0.06;
@@ -35,17 +35,17 @@ pub struct SignalFit {
     pub wake: Wake,
     /// The most likely powers relative to the model.
     pub powers: Powers,
-    /// Covariance \[10, 10\] of the parameters in the order of [`Parameter`]; zeros where one is fixed. It is the Cramer-Rao
-    /// bound at the tops of the likelihood and their distances from the highest, weighted with the likelihood.
+    /// Covariance \[10, 10\] of the parameters in the order of [`Parameter`]; zeros where one is fixed. It is the mean, weighted with
+    /// the likelihood, of the Cramer-Rao bound at each maximum and of the squared distance from the highest.
     pub covariance: Array2<f64>,
     /// Cramer-Rao bound \[10, 10\] at the fitted wake.
     pub bound: Array2<f64>,
-    /// All tops that were found within 6 of the highest (the fitted wake), which is the first. Those that the lines near the
-    /// vortices put more than 2 below it are theirs: ln p to some tenths.
+    /// All maxima that were found within 6 of the highest (the fitted wake), which is the first. Those more than 2 below it are fits of
+    /// the lines near the vortices only: ln p to some tenths.
     pub tops: Vec<Top>,
     /// Log-likelihood, but for a constant.
     pub log_likelihood: f64,
-    /// How much of it the vortices give: the difference to the same wind without vortices.
+    /// Contribution of the vortices: the difference to the same wind without vortices.
     pub log_likelihood_gain: f64,
     /// Rays that were used.
     pub used_rays: usize,
@@ -64,7 +64,7 @@ impl ScanModel {
     /// free parameters of `wake` from one scan; zeros where a parameter is fixed.
     ///
     /// # Errors
-    /// As [`ScanModel::information`]; [`Error::Linalg`] if a free parameter does not show in the signals.
+    /// As [`ScanModel::information`]; [`Error::Linalg`] if the signals do not determine a free parameter.
     pub fn bound(
         &self,
         wake: &Wake,
@@ -84,11 +84,11 @@ impl ScanModel {
 ///
 /// `snr(range_m, elevation_rad)` is signal power over noise power in the detector band, `noise_power` that noise power in
 /// the square of the unit of the samples; with `fit_powers` both need to be right only up to a factor. Rays with
-/// missing samples are left out.
+/// missing samples are skipped.
 ///
 /// # Errors
-/// As [`ScanModel::new`] and [`ScanSignals::new`]; [`Error::NotConverged`] if no start leads to a top; [`Error::Linalg`] if a
-/// free parameter does not show.
+/// As [`ScanModel::new`] and [`ScanSignals::new`]; [`Error::NotConverged`] if no start leads to a maximum; [`Error::Linalg`] if the
+/// signals do not determine a free parameter.
 pub fn fit_signals<S: Sample>(
     setup: &ScanSetup,
     snr: impl Fn(f64, f64) -> f64,
@@ -99,7 +99,7 @@ pub fn fit_signals<S: Sample>(
 ) -> Result<SignalFit, Error> {
     let mut start = options.free.start(guess);
     if options.starts == Starts::Several && options.free.core_radius != Sharing::Fixed {
-        // wide cores make few tops
+        // wide cores have few maxima
         start = start.with_cores(FIRST_CORE_OVER_SPACING * start.spacing_m());
     }
     let model = ScanModel::new(setup, &snr, &start)?;
@@ -123,68 +123,45 @@ pub fn fit_signals<S: Sample>(
                     log_likelihood,
                 })
             };
-            // a start that leads nowhere is no top
+            // a start that does not converge is no maximum
             tops.extend(settled);
         }
     }
     search.finish(tops)
 }
 
-/// A top and the model that was cut for it.
+/// A maximum and the model whose layers were made for it.
 struct Settled {
     model: Rc<ScanModel>,
     state: State,
     log_likelihood: f64,
 }
 
-/// The search for tops in one scan.
-struct Search<'a, F> {
+/// The search for maxima in one scan.
+struct Search<'a> {
     setup: &'a ScanSetup,
-    snr: &'a F,
+    snr: &'a dyn Fn(f64, f64) -> f64,
     signals: &'a ScanSignals,
     options: &'a SignalFitOptions,
 }
 
-impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
-    /// The top that a start leads to; with `rough` through ascents with a weaker signal if it is strong, or if the first goes astray.
+impl Search<'_> {
+    /// The maximum that a start leads to. With `rough` ascents with a weaker signal come first if the signal is strong, or if the first
+    /// ascent does not converge.
     fn settle(&self, start: State, rough: bool) -> Result<Settled, Error> {
-        let (mut state, signals, options) = (start, self.signals, self.options);
+        let mut state = start;
         for round in 0..ROUNDS {
             let model = ScanModel::new(self.setup, self.snr, &state.0)?;
-            let ascent = Ascent {
-                model: &model,
-                signals,
-                options,
-                others: None,
-            };
-            // The likelihood of a strong signal has many tops; that of the same signal said to be weak leads to the highest.
-            let weaker = |wake: Wake, snr: f64| {
-                let weak = Powers {
-                    log_signal: (snr / model.largest_snr).ln(),
-                    log_noise: 0.0,
-                };
-                let options = SignalFitOptions {
-                    fit_powers: false,
-                    tolerance_sigmas: ROUGH_SIGMAS,
-                    ..*options
-                };
-                let ascent = Ascent {
-                    model: &model,
-                    signals,
-                    options: &options,
-                    others: None,
-                };
-                ascent
-                    .climb((wake, weak))
-                    .map(|((wake, _), _)| (wake, Powers::default()))
-            };
-            if rough && round == 0 && model.largest_snr > 1.0 {
-                state = weaker(state.0, 1.0)?;
+            let is_rough = rough && round == 0;
+            if is_rough && model.largest_snr > 1.0 {
+                state = self.climb_weaker(&model, state.0, 1.0)?;
             }
+            let ascent = self.ascent(&model, self.options);
             let end = match ascent.climb(state) {
-                // astray between two tops: once more, from where a weaker signal leads
-                Err(Error::NotConverged { .. }) if rough && round == 0 => {
-                    ascent.climb(weaker(state.0, 0.3 * model.largest_snr.min(1.0))?)?
+                // between two maxima: once more, from the maximum of a weaker signal
+                Err(Error::NotConverged { .. }) if is_rough => {
+                    let snr = 0.3 * model.largest_snr.min(1.0);
+                    ascent.climb(self.climb_weaker(&model, state.0, snr)?)?
                 }
                 end => end?,
             };
@@ -203,7 +180,32 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
         })
     }
 
-    /// States near other tops than the first.
+    /// The maximum of the likelihood for a signal assumed to be as weak as `snr`: that of a strong signal has many maxima, that of a
+    /// weak one leads to the highest.
+    fn climb_weaker(&self, model: &ScanModel, wake: Wake, snr: f64) -> Result<State, Error> {
+        let weak = Powers {
+            log_signal: (snr / model.largest_snr).ln(),
+            log_noise: 0.0,
+        };
+        let options = SignalFitOptions {
+            fit_powers: false,
+            tolerance_sigmas: ROUGH_SIGMAS,
+            ..*self.options
+        };
+        let ((wake, _), _) = self.ascent(model, &options).climb((wake, weak))?;
+        Ok((wake, Powers::default()))
+    }
+
+    fn ascent<'s>(&'s self, model: &'s ScanModel, options: &'s SignalFitOptions) -> Ascent<'s> {
+        Ascent {
+            model,
+            signals: self.signals,
+            options,
+            others: None,
+        }
+    }
+
+    /// States near other maxima than the first.
     fn others(&self, first: &Settled) -> Result<Vec<Candidate>, Error> {
         let mut guess = first.state.0;
         if self.options.free.core_radius != Sharing::Fixed {
@@ -211,70 +213,63 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
         }
         let rough = ScanModel::with_layers(self.setup, self.snr, &guess, ROUGH_LAYERS)?;
         let near = near_lines(&rough, &first.state.0);
-        let ascent = Ascent {
-            model: &first.model,
-            signals: self.signals,
-            options: self.options,
-            others: None,
-        };
+        let ascent = self.ascent(&first.model, self.options);
         ascent.other_tops(&near, first.state)
     }
 
-    /// The highest top, and what the others add to its errors.
+    /// The highest maximum, with the contribution of the others to its errors.
     fn finish(&self, mut settled: Vec<Settled>) -> Result<SignalFit, Error> {
-        let (options, signals) = (self.options, self.signals);
+        let options = self.options;
+        let signals = self.signals;
         settled.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
         let failed = Error::NotConverged {
             iterations: ROUNDS,
             sigmas_left: f64::NAN,
         };
-        let mut tops: Vec<(&Settled, Array2<f64>, Array2<f64>)> = Vec::new();
+        let mut maxima: Vec<(&Settled, Array2<f64>, Array2<f64>)> = Vec::new();
         for next in &settled {
-            let ascent = Ascent {
-                model: &next.model,
-                signals,
-                options,
-                others: None,
-            };
-            if tops
+            let ascent = self.ascent(&next.model, options);
+            if maxima
                 .iter()
-                .any(|(top, information, _)| ascent.same(information, &top.state, &next.state))
+                .any(|(other, information, _)| ascent.same(information, &other.state, &next.state))
             {
                 continue;
             }
-            let stride = if tops.is_empty() {
+            let stride = if maxima.is_empty() {
                 1
             } else {
                 options.information_stride
             };
-            let share = signals.used_rays() as f64 / next.model.rays as f64;
-            let information = ascent.information(&next.state, stride)? * share;
+            let fraction = signals.used_rays() as f64 / next.model.rays as f64;
+            let information = ascent.information(&next.state, stride)? * fraction;
             let within = spread(
                 &options.free.groups(),
                 &inverse("information on the wake", &information)?,
             );
-            tops.push((next, information, within));
+            maxima.push((next, information, within));
         }
-        let (best, _, bound) = tops.first().ok_or(failed.clone())?;
+        let (best, _, bound) = maxima.first().ok_or(failed.clone())?;
         let (wake, powers) = best.state;
         let without = best
             .model
             .log_likelihood(signals, &wake.wind_alone(), powers)
             .ok_or(failed)?;
-        let weight = |top: &Settled| (top.log_likelihood - best.log_likelihood).exp();
-        let weighted = tops
-            .iter()
-            .map(|(top, _, within)| (weight(top), &top.state.0, within));
-        let top = |(top, ..): &(&Settled, _, _)| Top {
-            wake: top.state.0,
-            chi2: -2.0 * top.log_likelihood,
-        };
+        let mut weighted = Vec::new();
+        let mut tops = Vec::new();
+        for (maximum, _, within) in &maxima {
+            let weight = (maximum.log_likelihood - best.log_likelihood).exp();
+            weighted.push((weight, &maximum.state.0, within));
+            tops.push(Top {
+                wake: maximum.state.0,
+                chi2: -2.0 * maximum.log_likelihood,
+            });
+        }
         Ok(SignalFit {
             wake,
             powers,
-            covariance: mixed(weighted, &wake),
+            covariance: mixed(weighted.into_iter(), &wake),
             bound: bound.clone(),
-            tops: tops.iter().map(top).collect(),
+            tops,
             log_likelihood: best.log_likelihood,
             log_likelihood_gain: best.log_likelihood - without.log_likelihood,
             used_rays: signals.used_rays(),

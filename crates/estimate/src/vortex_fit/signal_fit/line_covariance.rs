@@ -40,16 +40,20 @@ impl ScanModel {
     fn phasors(&self, velocity_m_s: f64, out: &mut [f64]) {
         let (re, im) = out.split_at_mut(self.weights.lags + 1);
         let turn = self.baseband.turn_rad_s(velocity_m_s) * self.baseband.interval_s();
-        let (one, two) = (Complex::cis(turn), Complex::cis(2.0 * turn));
+        let one = Complex::cis(turn);
+        let two = Complex::cis(2.0 * turn);
         let even = self.weights.even;
         let mut at = Complex::ONE;
-        for place in 0..even {
-            (re[place], im[place]) = (at.re, at.im);
+        for index in 0..even {
+            re[index] = at.re;
+            im[index] = at.im;
             at *= two;
         }
-        for place in even..re.len() {
-            let (a, b) = (re[place - even], im[place - even]);
-            (re[place], im[place]) = (a * one.re - b * one.im, a * one.im + b * one.re);
+        for index in even..re.len() {
+            let a = re[index - even];
+            let b = im[index - even];
+            re[index] = a * one.re - b * one.im;
+            im[index] = a * one.im + b * one.re;
         }
     }
 
@@ -73,12 +77,13 @@ impl ScanModel {
         self.weigh_into(work, out);
     }
 
-    /// Change of that covariance when each layer's velocity changes by `slope(its derivatives)`.
+    /// Derivative of that covariance with respect to the parameters of `group`, which change together, times `factor`.
     pub(crate) fn change_into(
         &self,
         line: &Line,
         work: &mut Work,
-        slope: impl Fn(&[f64; PARAMETERS]) -> f64,
+        group: &[usize],
+        factor: f64,
         out: &mut Banded,
     ) {
         self.clear_nodes(work);
@@ -88,18 +93,18 @@ impl ScanModel {
             let (gain, gain_slope) = self.gain.at(*velocity);
             let (re, im) = work.phasor.split_at_mut(phase_slopes.len());
             for ((re, im), turn) in re.iter_mut().zip(im).zip(&phase_slopes) {
-                let (a, b) = (*re, *im);
-                (*re, *im) = (
-                    gain_slope * a - gain * turn * b,
-                    gain_slope * b + gain * turn * a,
-                );
+                let a = *re;
+                let b = *im;
+                *re = gain_slope * a - gain * turn * b;
+                *im = gain_slope * b + gain * turn * a;
             }
+            let slope: f64 = group.iter().map(|&parameter| slopes[parameter]).sum();
             add_to_nodes(
                 &mut work.nodes,
                 &work.phasor,
                 layer.node,
                 layer.share,
-                slope(slopes),
+                factor * slope,
             );
         }
         self.weigh_into(work, out);
@@ -112,7 +117,7 @@ impl ScanModel {
         work.nodes.resize(self.nodes * numbers, 0.0);
     }
 
-    /// (first node seen, places of the lags, the largest of them) for the middle 2 l + m = `twice` of samples l + m and l.
+    /// First node that contributes and indices of the lags, for the middle 2 l + m = `twice` of samples l + m and l.
     fn middle(&self, twice: usize) -> (usize, std::ops::Range<usize>) {
         let longest = twice.min(2 * (self.samples - 1) - twice);
         // the node of the middle is `twice + half + 2`; rows of weights run from -half to half
@@ -124,12 +129,12 @@ impl ScanModel {
         out.reset(self.samples, self.weights.lags);
         let lags = self.weights.lags + 1;
         for twice in 0..2 * self.samples - 1 {
-            let (first, places) = self.middle(twice);
-            let count = places.len();
+            let (first, indices) = self.middle(twice);
+            let count = indices.len();
             work.sums.clear();
             work.sums.resize(2 * count, 0.0);
             let (sum_re, sum_im) = work.sums.split_at_mut(count);
-            let row = (lags, places.start);
+            let row = (lags, indices.start);
             sum_nodes(
                 &self.weights.rows,
                 &work.nodes[first * 2 * lags..],
@@ -139,8 +144,9 @@ impl ScanModel {
             );
             for i in 0..count {
                 let lag = 2 * i + twice % 2;
-                let place = out.at((twice - lag) / 2, lag);
-                (out.re[place], out.im[place]) = (sum_re[i], sum_im[i]);
+                let index = out.at((twice - lag) / 2, lag);
+                out.re[index] = sum_re[i];
+                out.im[index] = sum_im[i];
             }
         }
     }
@@ -156,17 +162,18 @@ impl ScanModel {
         self.clear_nodes(work);
         let lags = self.weights.lags + 1;
         for twice in 0..2 * self.samples - 1 {
-            let (first, places) = self.middle(twice);
-            let count = places.len();
+            let (first, indices) = self.middle(twice);
+            let count = indices.len();
             work.sums.clear();
             work.sums.resize(2 * count, 0.0);
             let (sum_re, sum_im) = work.sums.split_at_mut(count);
             for i in 0..count {
                 let lag = 2 * i + twice % 2;
-                let place = weight.at((twice - lag) / 2, lag);
-                (sum_re[i], sum_im[i]) = (weight.re[place], weight.im[place]);
+                let index = weight.at((twice - lag) / 2, lag);
+                sum_re[i] = weight.re[index];
+                sum_im[i] = weight.im[index];
             }
-            let row = (lags, places.start);
+            let row = (lags, indices.start);
             spread_to_nodes(
                 &self.weights.rows,
                 &mut work.nodes[first * 2 * lags..],
@@ -176,32 +183,33 @@ impl ScanModel {
             );
         }
         let phase_slopes = self.lag_phase_slopes();
-        let mut seen = vec![0.0; 2 * lags];
+        let mut gathered = vec![0.0; 2 * lags];
         for (layer, (velocity, slopes)) in line.layers.iter().zip(&work.wind) {
             self.phasors(*velocity, &mut work.phasor);
             let (gain, gain_slope) = self.gain.at(*velocity);
-            seen.fill(0.0);
+            gathered.fill(0.0);
             for (i, share) in layer.share.iter().enumerate() {
                 let node = &work.nodes[(layer.node + i) * 2 * lags..][..2 * lags];
-                seen.iter_mut().zip(node).for_each(|(s, n)| *s += share * n);
+                for (sum, node) in gathered.iter_mut().zip(node) {
+                    *sum += share * node;
+                }
             }
             let (re, im) = work.phasor.split_at(lags);
-            let (seen_re, seen_im) = seen.split_at(lags);
+            let (g_re, g_im) = gathered.split_at(lags);
             let mut by_velocity = 0.0;
             for m in 0..lags {
-                by_velocity += gain * phase_slopes[m] * (re[m] * seen_im[m] - im[m] * seen_re[m])
-                    + gain_slope * (re[m] * seen_re[m] + im[m] * seen_im[m]);
+                by_velocity += gain * phase_slopes[m] * (re[m] * g_im[m] - im[m] * g_re[m])
+                    + gain_slope * (re[m] * g_re[m] + im[m] * g_im[m]);
             }
-            gradient
-                .iter_mut()
-                .zip(slopes)
-                .for_each(|(g, s)| *g += by_velocity * s);
+            for (sum, slope) in gradient.iter_mut().zip(slopes) {
+                *sum += by_velocity * slope;
+            }
         }
     }
 }
 
 /// Sums over nodes with the weights of one middle. The weight of a node at distance d from the middle is that of the middle at
-/// -d from the node: rows of `lags` weights run against the nodes. Lags are taken from place `start` of each row on.
+/// -d from the node: rows of `lags` weights run against the nodes. Lags are taken from index `start` of each row on.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 fn sum_nodes(
     weights: &[f64],
@@ -211,18 +219,14 @@ fn sum_nodes(
     sum_im: &mut [f64],
 ) {
     let count = sum_re.len().min(sum_im.len());
-    let (sum_re, sum_im) = (&mut sum_re[..count], &mut sum_im[..count]);
-    for (weights, node) in weights
-        .chunks_exact(lags)
-        .rev()
-        .zip(nodes.chunks_exact(2 * lags))
-    {
+    let sum_re = &mut sum_re[..count];
+    let sum_im = &mut sum_im[..count];
+    let rows = weights.chunks_exact(lags).rev();
+    for (row, node) in rows.zip(nodes.chunks_exact(2 * lags)) {
         let (re, im) = node.split_at(lags);
-        let (weights, re, im) = (
-            &weights[start..][..count],
-            &re[start..][..count],
-            &im[start..][..count],
-        );
+        let weights = &row[start..][..count];
+        let re = &re[start..][..count];
+        let im = &im[start..][..count];
         for i in 0..count {
             sum_re[i] += weights[i] * re[i];
             sum_im[i] += weights[i] * im[i];
@@ -240,18 +244,14 @@ fn spread_to_nodes(
     sum_im: &[f64],
 ) {
     let count = sum_re.len().min(sum_im.len());
-    let (sum_re, sum_im) = (&sum_re[..count], &sum_im[..count]);
-    for (weights, node) in weights
-        .chunks_exact(lags)
-        .rev()
-        .zip(nodes.chunks_exact_mut(2 * lags))
-    {
+    let sum_re = &sum_re[..count];
+    let sum_im = &sum_im[..count];
+    let rows = weights.chunks_exact(lags).rev();
+    for (row, node) in rows.zip(nodes.chunks_exact_mut(2 * lags)) {
         let (re, im) = node.split_at_mut(lags);
-        let (weights, re, im) = (
-            &weights[start..][..count],
-            &mut re[start..][..count],
-            &mut im[start..][..count],
-        );
+        let weights = &row[start..][..count];
+        let re = &mut re[start..][..count];
+        let im = &mut im[start..][..count];
         for i in 0..count {
             re[i] += weights[i] * sum_re[i];
             im[i] += weights[i] * sum_im[i];
@@ -266,8 +266,8 @@ fn add_to_nodes(nodes: &mut [f64], phasor: &[f64], first: usize, share: [f64; 4]
     for (i, share) in share.iter().enumerate() {
         let weight = factor * share;
         let node = &mut nodes[(first + i) * numbers..(first + i + 1) * numbers];
-        node.iter_mut()
-            .zip(phasor)
-            .for_each(|(n, p)| *n += weight * p);
+        for (node, phasor) in node.iter_mut().zip(phasor) {
+            *node += weight * phasor;
+        }
     }
 }

@@ -1,32 +1,32 @@
-//! How signals are fitted: what may change, where the fit begins and ends.
+//! Options of the fit of signals: free parameters, starts, tolerances.
 //!
 //! Check: fits with and without several starts.
 
 use crate::vortex_fit::FreeParameters;
 
-/// How the signals are fitted.
+/// Options of the fit of signals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignalFitOptions {
-    /// What may change.
+    /// The free parameters.
     pub free: FreeParameters,
     /// Whether the powers of signal and noise are fitted too, one factor each for the whole scan.
     pub fit_powers: bool,
-    /// The ascent begins with the information of every so-manyth line; the covariance of the result uses all.
+    /// Stride of the lines whose information starts the ascent; the covariance of the result uses all.
     pub information_stride: usize,
     /// Most evaluations of the likelihood in a round.
     pub max_iterations: usize,
-    /// The fit ends when the step that is left is below this part of its standard deviations.
+    /// The fit ends when the remaining step is below this fraction of the standard deviations.
     pub tolerance_sigmas: f64,
-    /// Where the fit begins.
+    /// Starts of the fit.
     pub starts: Starts,
 }
 
-/// Where a fit of signals begins.
+/// Starts of a fit of signals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Starts {
-    /// The guess alone: the top that is found depends on it.
+    /// The guess alone: which maximum is found depends on it.
     Guess,
-    /// The guess, then core radii from 1.5 to 12 % of the spacing and heights about the first top.
+    /// The guess, then core radii from 1.5 to 12 % of the spacing and heights about the first maximum.
     Several,
 }
 

@@ -15,7 +15,7 @@ use crate::vortex_fit::wake::pulse::PairWeights;
 use crate::vortex_fit::{Baseband, CoreProfile, PulseShape, Vortex, Wake, WakeModel};
 use crate::window::{SPEED_OF_LIGHT_M_S, Sampling, SignalKind};
 
-/// Covariances below this part of the noise are left out.
+/// Covariances below this fraction of the noise are neglected.
 const CUT: f64 = 1e-6;
 /// The layers stay thin enough while the vortices are within this distance of the guess \[m\].
 const MARGIN_M: f64 = 5.0;
@@ -81,7 +81,7 @@ pub struct ScanModel {
 
 impl ScanModel {
     /// The model for wakes near `guess`; `snr(range_m, elevation_rad)` is signal power over noise power in the
-    /// detector band, 0 where no air is seen.
+    /// detector band, 0 where there is no signal.
     ///
     /// # Errors
     /// [`Error::Empty`] without rays; [`Error::OutOfRange`] for an impossible guess, angle or SNR, or one that is 0
@@ -94,7 +94,7 @@ impl ScanModel {
         Self::with_layers(setup, snr, guess, 1.0)
     }
 
-    /// The same with layers `thicker` times as thick as the rule allows.
+    /// The model with layers `thicker` times as thick as the rule allows.
     pub(crate) fn with_layers(
         setup: &ScanSetup,
         snr: impl Fn(f64, f64) -> f64,
@@ -103,48 +103,29 @@ impl ScanModel {
     ) -> Result<Self, Error> {
         guess.validate()?;
         finite("first_sample_time_s", setup.first_sample_time_s)?;
-        setup
-            .elevation_rad
-            .iter()
-            .try_for_each(|e| finite("elevation_rad", *e))?;
+        for &elevation_rad in &setup.elevation_rad {
+            finite("elevation_rad", elevation_rad)?;
+        }
         not_empty("elevation_rad", setup.elevation_rad.len())?;
         let baseband = Baseband::new(&setup.sampling, setup.kind)?;
         let samples = baseband.samples(setup.record_samples)?;
         let interval_s = baseband.interval_s();
-        let weights_of = |cut| PairWeights::new(&setup.pulse, interval_s, samples, cut);
+        let first_time_s = setup.first_sample_time_s + baseband.delay_s();
         // the first table serves to place the layers, the second has the lags that their SNR needs
-        let probe = weights_of(1.0);
+        let probe = PairWeights::new(&setup.pulse, interval_s, samples, 1.0);
         let cutter = Cutter {
             setup,
             guess,
             thicker,
-            first_range_m: 0.5
-                * SPEED_OF_LIGHT_M_S
-                * (setup.first_sample_time_s + baseband.delay_s()),
+            first_range_m: 0.5 * SPEED_OF_LIGHT_M_S * first_time_s,
             spacing_m: 0.25 * SPEED_OF_LIGHT_M_S * interval_s,
             samples,
             half: probe.half,
         };
-        let mut largest = 0.0;
-        let mut lines = Vec::<(f64, Line)>::new();
-        for (ray, &elevation_rad) in setup.elevation_rad.iter().enumerate() {
-            match lines.iter_mut().find(|(angle, _)| *angle == elevation_rad) {
-                Some((_, line)) => line.rays.push(ray),
-                None => {
-                    let layers = cutter.layers(elevation_rad, &snr, &mut largest)?;
-                    lines.push((
-                        elevation_rad,
-                        Line {
-                            ray: Ray::new(elevation_rad),
-                            layers,
-                            rays: vec![ray],
-                        },
-                    ));
-                }
-            }
-        }
-        positive("largest SNR", largest)?;
-        let weights = weights_of(CUT / largest.max(1.0));
+        let (lines, largest_snr) = cutter.lines(&snr)?;
+        positive("largest SNR", largest_snr)?;
+        let cut = CUT / largest_snr.max(1.0);
+        let weights = PairWeights::new(&setup.pulse, interval_s, samples, cut);
         Ok(Self {
             wake: setup.wake,
             gain: baseband.power_gain(),
@@ -155,29 +136,21 @@ impl ScanModel {
             record_samples: setup.record_samples,
             rays: setup.elevation_rad.len(),
             nodes: 2 * samples - 1 + 2 * cutter.pad(),
-            lines: lines.into_iter().map(|(_, line)| line).collect(),
+            lines,
             guess: *guess,
-            largest_snr: largest,
+            largest_snr,
         })
     }
 
     /// Whether the layers are still thin enough for a wake.
     pub(crate) fn covers(&self, wake: &Wake) -> bool {
-        // steeper cores are those smaller than the third to spare
-        let covers = |a: &Vortex, b: &Vortex| {
-            a.away_m(b.place_m()) <= MARGIN_M && a.core_radius_m >= b.core_radius_m * 2.0 / 3.0
-        };
-        covers(&wake.left, &self.guess.left) && covers(&wake.right, &self.guess.right)
+        is_covered(&wake.left, &self.guess.left) && is_covered(&wake.right, &self.guess.right)
     }
 
     /// The model of some of the lines alone.
-    pub(crate) fn of_lines(&self, keep: impl Fn(&Line) -> bool) -> Self {
-        let lines: Vec<Line> = self
-            .lines
-            .iter()
-            .filter(|line| keep(line))
-            .cloned()
-            .collect();
+    pub(crate) fn with_lines(&self, keep: impl Fn(&Line) -> bool) -> Self {
+        let kept = self.lines.iter().filter(|line| keep(line));
+        let lines: Vec<Line> = kept.cloned().collect();
         Self {
             rays: lines.iter().map(|line| line.rays.len()).sum(),
             lines,
@@ -189,6 +162,13 @@ impl ScanModel {
     pub(crate) fn has(&self, line: &Line) -> bool {
         self.lines.iter().any(|own| own.rays == line.rays)
     }
+}
+
+/// Whether layers for the vortex of a guess are thin enough for another one.
+fn is_covered(vortex: &Vortex, guess: &Vortex) -> bool {
+    // layers allow for cores that are smaller by a third, thus steeper
+    let is_wide = vortex.core_radius_m >= guess.core_radius_m * 2.0 / 3.0;
+    vortex.away_m(guess.place_m()) <= MARGIN_M && is_wide
 }
 
 /// Cuts lines of sight into layers.
@@ -211,6 +191,27 @@ impl Cutter<'_> {
         self.half + 2
     }
 
+    /// Lines of sight with their layers, and the largest SNR.
+    fn lines(&self, snr: &dyn Fn(f64, f64) -> f64) -> Result<(Vec<Line>, f64), Error> {
+        let mut largest_snr = 0.0;
+        let mut lines = Vec::<Line>::new();
+        let mut angles_rad = Vec::<f64>::new();
+        for (ray, &elevation_rad) in self.setup.elevation_rad.iter().enumerate() {
+            let known = angles_rad.iter().position(|angle| *angle == elevation_rad);
+            if let Some(index) = known {
+                lines[index].rays.push(ray);
+                continue;
+            }
+            angles_rad.push(elevation_rad);
+            lines.push(Line {
+                ray: Ray::new(elevation_rad),
+                layers: self.layers(elevation_rad, snr, &mut largest_snr)?,
+                rays: vec![ray],
+            });
+        }
+        Ok((lines, largest_snr))
+    }
+
     /// Layers that the wake of the guess needs in the node interval about a point, a third of its core radius spare.
     fn parts(&self, range_m: f64, elevation_rad: f64) -> f64 {
         let place_m = self.setup.wake.position_m(range_m, elevation_rad);
@@ -218,15 +219,13 @@ impl Cutter<'_> {
             CoreProfile::Algebraic => 1.0,
             CoreProfile::LambOseen => 1.5,
         };
-        let gradient_per_s: f64 = [&self.guess.left, &self.guess.right]
-            .iter()
-            .map(|vortex| {
-                let away_m = vortex.away_m(place_m) - MARGIN_M - self.spacing_m;
-                let core_m = vortex.core_radius_m * 2.0 / 3.0;
-                let radius_m = away_m.max(2.0 * core_m / steep.sqrt());
-                vortex.circulation_m2_s.abs() / (2.0 * PI * radius_m * radius_m)
-            })
-            .sum();
+        let mut gradient_per_s = 0.0;
+        for vortex in [&self.guess.left, &self.guess.right] {
+            let away_m = vortex.away_m(place_m) - MARGIN_M - self.spacing_m;
+            let core_m = vortex.core_radius_m * 2.0 / 3.0;
+            let radius_m = away_m.max(2.0 * core_m / steep.sqrt());
+            gradient_per_s += vortex.circulation_m2_s.abs() / (2.0 * PI * radius_m * radius_m);
+        }
         let limit_m =
             self.setup.sampling.wavelength_m / (16.0 * self.setup.pulse.sigma_s * gradient_per_s);
         (self.spacing_m / (self.thicker * limit_m))
@@ -234,11 +233,12 @@ impl Cutter<'_> {
             .clamp(1.0, MOST_LAYERS)
     }
 
+    /// Layers of a line of sight; raises `largest_snr` to theirs.
     fn layers(
         &self,
         elevation_rad: f64,
-        snr: &impl Fn(f64, f64) -> f64,
-        largest: &mut f64,
+        snr: &dyn Fn(f64, f64) -> f64,
+        largest_snr: &mut f64,
     ) -> Result<Vec<Layer>, Error> {
         let mut layers = Vec::new();
         // intervals between nodes that the pulse reaches from the first to the last sample
@@ -251,7 +251,7 @@ impl Cutter<'_> {
                 let range_m = self.first_range_m + (interval as f64 + s) * self.spacing_m;
                 let ratio = snr(range_m, elevation_rad);
                 not_negative("snr", ratio)?;
-                *largest = largest.max(ratio);
+                *largest_snr = largest_snr.max(ratio);
                 if range_m > 0.0 && ratio > 0.0 {
                     let node = (interval + self.pad() as i64 - 1) as usize;
                     layers.push(Layer {
@@ -270,7 +270,8 @@ impl Cutter<'_> {
 /// layers of different thickness then join without an error of the midpoint rule.
 fn mean_cubic(s: f64, half: f64) -> [f64; 4] {
     let apart = half / 3.0_f64.sqrt();
-    let (a, b) = (cubic(s - apart), cubic(s + apart));
+    let a = cubic(s - apart);
+    let b = cubic(s + apart);
     std::array::from_fn(|i| 0.5 * (a[i] + b[i]))
 }
 
