@@ -2,7 +2,6 @@
 //! below which no layer can go.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::hint::black_box;
 use wakescope_optics::Grid;
@@ -12,8 +11,7 @@ const N: usize = 512;
 
 /// Rows, transpose, rows, and back: what any split step needs at least.
 fn transform_pair<T: Real>(c: &mut Criterion, name: &str) {
-    let mut planner = FftPlanner::<T>::new();
-    let (forward, inverse) = (planner.plan_fft_forward(N), planner.plan_fft_inverse(N));
+    let [forward, inverse] = T::transforms(N);
     let mut scratch = vec![
         Complex::default();
         forward

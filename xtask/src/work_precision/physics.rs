@@ -11,7 +11,6 @@ use fixtures::{ENERGY_J, receiver};
 use num_complex::Complex;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
-use rustfft::FftPlanner;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use wakescope_les::solver::{PressureMethod, TimeStep};
@@ -296,7 +295,7 @@ const KERNEL_RUNS: usize = 20;
 
 /// Processor time of the lines of twenty transforms of 512 x 512 points \[s\]: by it times of another machine are scaled to this one.
 pub(super) fn kernel_s() -> Result<f64, Failure> {
-    let fft = FftPlanner::<f64>::new().plan_fft_forward(512);
+    let [fft, _] = f64::transforms(512);
     let mut field = vec![Complex::new(1.0, 0.0); 512 * 512];
     let mut scratch = vec![Complex::default(); 512];
     let both_ways = 2 * 20;

@@ -23,13 +23,10 @@ const LANES: usize = 16;
 pub(crate) const LOW_ORDER: usize = 16;
 
 mod sealed {
-    use super::{Arc, Fft, FftNum};
+    use super::FftNum;
 
     /// Operations of the inner loops on a number, beside its arithmetic.
     pub trait Scalar: FftNum {
-        /// The forward and the inverse transform of a length; of each type by itself, so that the
-        /// planner is compiled with this crate and not again by each program that names the type.
-        fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2];
         /// The nearest number of this type.
         fn of_i32(value: i32) -> Self;
         /// Square root; 0 below 0.
@@ -49,6 +46,9 @@ pub trait Real: sealed::Scalar + FftNum + Default + PartialOrd {
     fn of(value: f64) -> Self;
     /// The number as f64.
     fn wide(self) -> f64;
+    /// The forward and the inverse Fourier transform of a length; of each type by itself, so that
+    /// the planner is compiled with this crate and not again by each program that names the type.
+    fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2];
 }
 
 /// field *= exp(j scale phase).
@@ -186,14 +186,6 @@ pub(crate) fn finish_screen<T: Real>(
 macro_rules! scalar {
     ($real:ident, $bits:ident, $mantissa:expr, $sqrt_half:expr, $one_exp:expr, $pi_half:expr, $sin:expr, $cos:expr, $log:expr) => {
         impl sealed::Scalar for $real {
-            fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2] {
-                let mut planner = FftPlanner::new();
-                [
-                    planner.plan_fft_forward(length),
-                    planner.plan_fft_inverse(length),
-                ]
-            }
-
             #[inline(always)]
             fn of_i32(value: i32) -> Self {
                 value as $real
@@ -255,6 +247,14 @@ macro_rules! scalar {
             }
             fn wide(self) -> f64 {
                 f64::from(self)
+            }
+
+            fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2] {
+                let mut planner = FftPlanner::new();
+                [
+                    planner.plan_fft_forward(length),
+                    planner.plan_fft_inverse(length),
+                ]
             }
         }
     };
