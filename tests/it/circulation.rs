@@ -46,7 +46,7 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
     scene.scan.realisations = 1;
     change(&mut scene);
     let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Signal).unwrap();
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let setup = ScanSetup {
         sampling: estimators::sampling(scene).unwrap(),
         kind: SignalKind::Real,
@@ -72,7 +72,7 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
 /// Accumulated map of the likelihood with regions of 2 m, and the fit to it without prior knowledge.
 fn map_fit(taken: &Taken, options: &MapFitOptions) -> MapFit {
     let (sampling, kind) = (taken.setup.sampling, SignalKind::Real);
-    let gates = estimators::gates(&taken.plan.scene.content).unwrap();
+    let gates = estimators::gates(taken.plan.scene()).unwrap();
     let pulse = &taken.plan.instrument.pulse;
     let window = WindowModel::gaussian_pulse(&sampling, 64, pulse.sigma_s(), Noise::White).unwrap();
     let tapers = likelihood_tapers(&window, taken.snr).unwrap();

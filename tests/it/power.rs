@@ -23,7 +23,7 @@ const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
 
 /// (14) as it is written, for a return that changes slowly over the pulse, in even air.
 fn of_14(plan: &Plan, range_m: f64, efficiency: f64) -> f64 {
-    let (scene, air) = (&plan.scene.content, &plan.scene.content.atmosphere);
+    let (scene, air) = (plan.scene(), &plan.scene().atmosphere);
     let photon_j = 6.626_070_15e-34 * SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m;
     let photons = scene.detector.quantum_efficiency * scene.pulse.energy_j / photon_j;
     let area_m2 = std::f64::consts::PI * scene.telescope.aperture_radius_m.powi(2);
@@ -59,7 +59,7 @@ fn mean_signal_power_over_noise_power_is_the_snr_of_14() {
     // The mean over the samples of the record.
     let g = &plan.geometry;
     let expected = (0..g.samples)
-        .map(|k| plan.scene.content.scan.range_min_m + k as f64 * g.sample_spacing_m)
+        .map(|k| plan.scene().scan.range_min_m + k as f64 * g.sample_spacing_m)
         .map(|r| of_14(&plan, r, free_space_efficiency(telescope, r).unwrap()))
         .sum::<f64>()
         / g.samples as f64;
@@ -96,7 +96,7 @@ fn power_does_not_depend_on_the_layer_thickness() {
     // A steep flow makes the layers thinner; at rest the same scene has layers of one sample.
     let [thick, mut thin] = [(), ()].map(|()| plan(|s| s.detector.noise = NoiseModel::None));
     let factor = 4;
-    let g = &mut thin.setup.geometry;
+    let g = &mut thin.geometry;
     g.layer_thickness_m /= factor as f64;
     g.layers *= factor;
     g.layers_per_sample = (g.layers_per_sample - 1) * factor + 1;
@@ -121,8 +121,7 @@ fn power_through_a_near_focus_is_14_over_the_pulse() {
             s.scan.pulses_per_line = 200;
         });
         let g = &plan.geometry;
-        let range_m =
-            |k: usize| plan.scene.content.scan.range_min_m + k as f64 * g.sample_spacing_m;
+        let range_m = |k: usize| plan.scene().scan.range_min_m + k as f64 * g.sample_spacing_m;
         let near: Vec<usize> = (0..g.samples)
             .filter(|k| (range_m(*k) - at_m).abs() < 8.0)
             .collect();

@@ -27,7 +27,7 @@
 //! | module | what is in it |
 //! |---|---|
 //! | [`scene`] | the scene: keys, defaults, limits, errors with line numbers |
-//! | [`plan`] | what a run will do: instrument, estimators, wind and geometry of a scene; stages with their time and memory |
+//! | [`plan`], `stages` | what a run will do: instrument, estimators, wind and geometry of a scene; its stages, planned by their own modules |
 //! | [`beams`] | when, from where and in which direction each pulse leaves |
 //! | [`progress`], [`streams`] | progress of a run and how to stop it; one random stream for each pulse |
 //! | [`measure`] | signals, velocities and their errors |
@@ -64,6 +64,7 @@ mod quantities;
 pub mod retrieve;
 pub mod run;
 pub mod scene;
+mod stages;
 pub mod streams;
 pub mod sweep;
 pub mod write;

@@ -1,10 +1,10 @@
-//! Values that several scenes share, each computed once: known by the hash of what they depend on.
+//! Values that several scenes share, each computed once: identified by what they depend on.
 
 use crate::Error;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Values by the hash of what they depend on.
+/// Values by what they depend on.
 #[derive(Debug)]
 pub(crate) struct Memo<T>(Mutex<HashMap<String, Arc<T>>>);
 
@@ -15,26 +15,26 @@ impl<T> Default for Memo<T> {
 }
 
 impl<T> Memo<T> {
-    /// The value of a cause, made if it is not known; one at a time.
+    /// The value of a key, made if there is none yet; one at a time.
     ///
     /// # Errors
-    /// Those of `make`.
-    pub(crate) fn of(
+    /// Fails if `make` fails.
+    pub(crate) fn get_or_make(
         &self,
-        cause: String,
+        key: String,
         make: impl FnOnce() -> Result<T, Error>,
     ) -> Result<Arc<T>, Error> {
         // A value that could not be made left nothing behind.
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(value) = known.get(&cause) {
+        let mut values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(value) = values.get(&key) {
             return Ok(Arc::clone(value));
         }
         let made = Arc::new(make()?);
-        known.insert(cause, Arc::clone(&made));
+        values.insert(key, Arc::clone(&made));
         Ok(made)
     }
 
-    /// How many were made.
+    /// Number of values that were made.
     pub(crate) fn len(&self) -> usize {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).len()
     }

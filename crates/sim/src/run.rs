@@ -5,7 +5,7 @@ use crate::interpolation::{interpolate, linspace};
 use crate::io::CrossPlanes;
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::plane;
-use crate::measure::profile::{Efficiencies, LineOptics, RangeProfile};
+use crate::measure::profile::{EfficiencyMemo, LineOptics, RangeProfile};
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage, Target};
 use crate::progress::Observer;
@@ -70,7 +70,7 @@ impl ScanMiddle {
 }
 
 fn middle_m(plan: &Plan) -> f64 {
-    let scan = &plan.scene.content.scan;
+    let scan = &plan.scene().scan;
     0.5 * (scan.range_min_m + scan.range_max_m)
 }
 
@@ -80,7 +80,7 @@ fn middle_m(plan: &Plan) -> f64 {
 /// What the crates refuse; a checked scene gives none.
 pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let mut result = RunResult::default();
-    let (o, known, mut there) = (&plan.scene.content.outputs, Efficiencies::default(), None);
+    let (o, known, mut there) = (&plan.scene().outputs, EfficiencyMemo::default(), None);
     let optics = LineOptics {
         plan,
         known: &known,
@@ -108,7 +108,7 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
         .transpose()?;
     result.middle = ScanMiddle::of(plan, there.as_ref(), scanner.as_ref());
     if let Some(scanner) = scanner {
-        match plan.scene.content.detector.signal {
+        match plan.scene().detector.signal {
             DetectorSignal::IntermediateFrequency => {
                 signals_and_map::<f64>(plan, &scanner, observer, &mut result)?
             }

@@ -1,9 +1,11 @@
 //! Writes what a run gives, and what recorded signals gave: all files appear together, or none.
 //! Check: files of a run's own signals have the bytes of the run.
 
+mod limits;
 mod map;
 #[cfg(feature = "plots")]
 mod pictures;
+pub(crate) mod stage;
 
 pub use map::velocity_map;
 
@@ -26,7 +28,7 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// As [`write()`], but for what the files hold.
 pub fn names(plan: &Plan) -> Result<Vec<String>, Error> {
-    Outputs::names(plan.scene.content.outputs, |files| {
+    Outputs::names(plan.scene().outputs, |files| {
         list(plan, &RunResult::default(), files)
     })
 }
@@ -42,11 +44,11 @@ pub fn write(
     folder: &Path,
     existing: Existing,
 ) -> Result<Vec<PathBuf>, Error> {
-    let formats = plan.scene.content.outputs;
+    let formats = plan.scene().outputs;
     Outputs::write(
         folder,
         existing,
-        (formats, plan.scene.provenance()),
+        (formats, plan.file.provenance()),
         |files| list(plan, result, files),
     )
 }
@@ -80,7 +82,7 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
         })?;
     }
     if plan.runs(Stage::Estimates) {
-        let pattern = &plan.scene.content.scan.pattern;
+        let pattern = &plan.scene().scan.pattern;
         let map = result
             .map
             .as_ref()
@@ -122,7 +124,7 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
 /// # Errors
 /// As [`write()`], but for what the files hold.
 pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
-    let mut names = Outputs::names(plan.scene.content.outputs, |files| {
+    let mut names = Outputs::names(plan.scene().outputs, |files| {
         of_run(plan, &RunResult::default(), None, files)
     })?;
     // Those that are estimated stay where they are.
@@ -204,7 +206,7 @@ fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Resu
         })?;
     }
     let sweeps = map.map_or(schedule.sweeps.len(), |map| map.sweeps.len());
-    for sweep in (0..sweeps).filter(|_| plan.scene.content.outputs.hpl) {
+    for sweep in (0..sweeps).filter(|_| plan.scene().outputs.hpl) {
         let stem = if sweeps == 1 {
             "halo".to_owned()
         } else {
@@ -224,7 +226,7 @@ fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Resu
 #[cfg(feature = "plots")]
 pub fn write_set_up(plan: &Plan, path: &Path, existing: Existing) -> Result<(), Error> {
     let figure = pictures::scan(plan);
-    let origin = plan.scene.provenance();
+    let origin = plan.file.provenance();
     let bytes = match path.extension().and_then(|ending| ending.to_str()) {
         Some("svg") => figure.svg(&origin)?.into_bytes(),
         Some("png") => figure.png(&origin)?,
@@ -271,7 +273,7 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
 
 /// The raw signals of a run, with what makes them readable.
 fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let g = &plan.geometry;
     let beams: Vec<Beam> = (0..g.schedule.pulses())
         .map(|pulse| g.schedule.beam_of_pulse(pulse))
@@ -301,7 +303,7 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
 }
 
 fn recording(plan: &Plan) -> Recording {
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let d = &scene.detector;
     let receiver = &plan.instrument.receiver;
     let is_baseband = d.signal == DetectorSignal::Baseband;

@@ -9,7 +9,7 @@ const DRAWN: usize = 8;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let plan = Plan::new(context.scene_file(Scene::default())?, Target::Run)?;
-    let scan = &plan.scene.content.scan;
+    let scan = &plan.scene().scan;
     let elevation_rad = &plan.geometry.elevation_rad;
     let first = points(elevation_rad, scan.range_min_m, scan.lidar_height_m);
     let last = points(elevation_rad, scan.range_max_m, scan.lidar_height_m);
@@ -43,7 +43,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         equal_scales: true,
         ..CurvePlot::new("Scan across the runway", x, y)
     };
-    let origin = plan.scene.provenance();
+    let origin = plan.file.provenance();
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
     out.values = vec![
         elevation_rad.len().to_string(),

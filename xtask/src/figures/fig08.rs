@@ -77,7 +77,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     figure.columns = 2;
     figure.width = 1300.0;
     let table = Table::stack([map_table(&early)?, map_table(&late)?])?;
-    let mut out = Rendered::new(&table, &figure, &late_study.plan.scene.provenance())?;
+    let mut out = Rendered::new(&table, &figure, &late_study.plan.file.provenance())?;
     out.values = vec![wake.words()];
     out.claims.push(Claim::exact(
         "F8",

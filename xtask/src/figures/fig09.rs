@@ -25,7 +25,7 @@ struct Accumulation {
 
 impl Accumulation {
     fn new(plan: &Plan) -> Result<Self, Failure> {
-        let scene = &plan.scene.content;
+        let scene = plan.scene();
         let elevation_rad = &plan.geometry.elevation_rad;
         let gates = estimators::gates(scene)?;
         let sampling = estimators::sampling(scene)?;
@@ -104,7 +104,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         series,
         ..CurvePlot::new("Accumulation level", x, y)
     };
-    let origin = plan.scene.provenance();
+    let origin = plan.file.provenance();
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
     let at_chapter = RADII_M.map(|radius_m| accumulation.level(CHAPTER_RANGE_M, radius_m));
     out.claims = vec![falling_claim(&levels), chapter_claim(&at_chapter)];

@@ -45,7 +45,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             claims.push(Claim::judged_alone("F10", of_rms, "", Bar::Above(0.0)));
         }
     }
-    let origin = studies[0].plan.scene.provenance();
+    let origin = studies[0].plan.file.provenance();
     let mut out = Rendered::new(
         &stacked("snr_reference", tables)?,
         &Figure::stacked(panels),

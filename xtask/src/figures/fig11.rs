@@ -68,7 +68,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             parts = of_map;
         }
     }
-    let origin = studies[0].plan.scene.provenance();
+    let origin = studies[0].plan.file.provenance();
     let mut out = Rendered::new(
         &stacked("snr_reference", tables)?,
         &Figure::stacked(panels),

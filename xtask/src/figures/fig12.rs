@@ -71,7 +71,7 @@ fn curve(study: &Study, reference: &'static str) -> Curve {
     let far = study.cells(|d, j| d > OUTSIDE_M && j >= gates / 2);
     Curve {
         reference,
-        energy_j: study.plan.scene.content.pulse.energy_j,
+        energy_j: study.plan.scene().pulse.energy_j,
         over_lines,
         mean_of_lines_m_s,
         inside: study.zone(&study.cells(|d, _| d < INSIDE_M)),
@@ -195,7 +195,7 @@ fn levels(curves: &[Curve], zone: fn(&Curve) -> &Zone) -> String {
 }
 
 fn outside_claim(curves: &[Curve], study: &Study) -> Claim {
-    let s = &study.plan.scene.content;
+    let s = study.plan.scene();
     // What guesses all over the band err; an energy whose estimates are half of that has no signal.
     let guesses_m_s = 0.5 * s.laser.wavelength_m * s.detector.bandwidth_hz / 12_f64.sqrt();
     let mut energies = of_chapter(curves);

@@ -58,13 +58,13 @@ fn settings(
 ) -> Result<DetectionSettings, Failure> {
     Ok(DetectionSettings {
         false_alarm: rate,
-        gate: gate_of(None, None, Some(&plan.scene.content))?.0,
+        gate: gate_of(None, None, Some(plan.scene()))?.0,
         options: DetectorOptions {
             turbulence,
             ..DetectorOptions::default()
         },
         stride: noise.stride,
-        seed: plan.scene.content.seed,
+        seed: plan.scene().seed,
         ..DetectionSettings::default()
     })
 }
@@ -127,7 +127,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 /// their fraction, with the binomial standard error of the rate that was set.
 fn alarms(plan: &Plan, noise: &SceneNoise, scans: usize, rate: f64) -> Result<Estimate, Failure> {
     let settings = settings(plan, noise, None, rate)?;
-    let mut file = plan.scene.clone();
+    let mut file = plan.file.clone();
     file.content.scan.realisations = scans;
     let mut maps = Vec::new();
     for velocity_m_s in velocities(&Plan::new(file, Target::Map)?, &Silent)? {

@@ -68,7 +68,7 @@ impl Profiles {
         Self {
             method,
             name,
-            pulse_s: study.plan.scene.content.pulse_width_s(),
+            pulse_s: study.plan.scene().pulse_width_s(),
             snr_db,
             inside: study.zone(&study.cells(|d, _| d < INSIDE_M)),
             outside: study.zone(&study.cells(|d, _| d > OUTSIDE_M)),

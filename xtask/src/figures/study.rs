@@ -223,7 +223,7 @@ impl Study {
             let elevation_rad = map.elevation_rad[line];
             let range_m = map.range_m[gate];
             let y_m = range_m * elevation_rad.cos();
-            let z_m = plan.scene.content.scan.lidar_height_m + range_m * elevation_rad.sin();
+            let z_m = plan.scene().scan.lidar_height_m + range_m * elevation_rad.sin();
             let mut nearest_m = f64::INFINITY;
             for core in &sight.cores {
                 nearest_m = nearest_m.min((y_m - core.0).hypot(z_m - core.1));
@@ -240,7 +240,7 @@ impl Study {
 
     /// Centres of the vortices in the polar coordinates of the scan: (range, elevation).
     pub(super) fn cores_polar(&self) -> Vec<(f64, f64)> {
-        let height_m = self.plan.scene.content.scan.lidar_height_m;
+        let height_m = self.plan.scene().scan.lidar_height_m;
         self.cores
             .iter()
             .map(|c| (c.0.hypot(c.1 - height_m), (c.1 - height_m).atan2(c.0)))

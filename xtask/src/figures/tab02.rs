@@ -33,13 +33,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let file = SceneFile::parse(TABLE2_TOML, Path::new("table2.toml"))?;
     let plan = Plan::new(context.scene_file(file.content)?, Target::Run)?;
     // What counts is the scene as the run writes it down, not as it was read.
-    let back = SceneFile::parse(&plan.scene.toml, Path::new("scene.toml"))?.content;
+    let back = SceneFile::parse(&plan.file.toml, Path::new("scene.toml"))?.content;
     let values: Vec<f64> = ROWS.iter().map(|r| (r.2)(&back)).collect();
     let table = Table::new()
         .text("parameter", column(&ROWS, |r| r.0))
         .float("chapter", column(&ROWS, |r| r.1))
         .float("scene", values.iter().copied());
-    let mut out = Rendered::of_table(&table, &plan.scene.provenance())?;
+    let mut out = Rendered::of_table(&table, &plan.file.provenance())?;
     let equal = ROWS.iter().zip(&values).filter(|(r, v)| r.1 == **v).count();
     out.claims.push(Claim::exact(
         "T2",

@@ -89,7 +89,7 @@ impl Report {
 
 /// Metrics that a scene may have.
 fn metrics_of(plan: &Plan, request: &Request) -> Vec<Metric> {
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let mut metrics = Vec::new();
     if crosses_screens(plan) {
         metrics.push(Metric::Efficiency);
@@ -110,20 +110,20 @@ fn metrics_of(plan: &Plan, request: &Request) -> Vec<Metric> {
 
 /// Whether phase screens make the efficiency in the middle of the scan, and all pulses have it in common.
 fn crosses_screens(plan: &Plan) -> bool {
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let is_common = model(scene) == Model::MonteCarlo && drawn_turbulence(scene).is_none();
     is_common && middle_stretch(plan).is_some()
 }
 
 /// Range in the middle of the scan, m.
 fn middle_m(plan: &Plan) -> f64 {
-    let scan = &plan.scene.content.scan;
+    let scan = &plan.scene().scan;
     0.5 * (scan.range_min_m + scan.range_max_m)
 }
 
 /// The stretch of range with phase screens of its own that the middle of the scan is in, m.
 fn middle_stretch(plan: &Plan) -> Option<[f64; 2]> {
-    stretches(&plan.scene.content, &plan.geometry, &[middle_m(plan)])
+    stretches(plan.scene(), &plan.geometry, &[middle_m(plan)])
         .first()
         .map(|(ends_m, _)| *ends_m)
 }
@@ -279,7 +279,7 @@ impl<'a> Study<'a> {
             rows.push(match trial {
                 Ok(trial) => {
                     let finest = finest.get_or_insert_with(|| trial.clone());
-                    // Efficiencies are computed once for all runs with the same path.
+                    // EfficiencyMemo are computed once for all runs with the same path.
                     let optics_s = match key {
                         LAYERS | GRID_POINTS | GRID_SPACING | PATHS => trial.optics_s,
                         _ => self.given.optics_s,

@@ -11,7 +11,7 @@ use crate::measure::recorded::{
     self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra,
 };
 use crate::outputs::{List, Outputs};
-use crate::plan::Plan;
+use crate::plan::{Plan, Target};
 use crate::progress::{Observer, Silent};
 use crate::scene::SceneFile;
 use crate::{Error, retrieve, scene};
@@ -159,7 +159,8 @@ impl ScanArgs {
         let mut records = recorded::open(path, &RawFormat::default(), &scene.content)?;
         records.scale = self.scale.unwrap_or(1.0);
         records.is_reversed = self.towards;
-        let (plan, is_own) = recorded::plan(scene.clone(), &records, observer)?;
+        let (scene, is_own) = recorded::scene_of_records(scene.clone(), &records, observer)?;
+        let plan = Plan::new(scene, Target::Map)?;
         if is_own && self.scale.is_some() {
             let reason = "signals of a simulation are in ampere";
             return Err(refusal_of_idle(path, "scale", reason));

@@ -3,7 +3,7 @@
 use super::options::WITHOUT_OUTPUT;
 use super::{Cli, paths};
 use crate::io::Existing;
-use crate::measure::bound::{bound as of_plan, points};
+use crate::measure::bound::{bound as of_plan, fits, points};
 use crate::measure::budget::{Budget, scan_ranges_m};
 use crate::outputs::Outputs;
 use crate::plan::{Plan, Target};
@@ -17,7 +17,7 @@ use std::path::Path;
 pub(super) fn plan(scene: &Path, allow_large: bool, cli: &Cli) -> Result<Plan, Error> {
     let plan = Plan::new(cli.scene(scene)?, Target::Map)?;
     if !allow_large {
-        plan.bound_fits()?;
+        fits(&plan)?;
     }
     Ok(plan)
 }
@@ -31,17 +31,17 @@ pub(super) fn bound(
 ) -> Result<(), Error> {
     match out {
         Some(file) => cli.prepare_file(file, Existing::with_overwrite(overwrite))?,
-        None => cli.refuse_idle(plan.scene.path(), WITHOUT_OUTPUT)?,
+        None => cli.refuse_idle(plan.file.path(), WITHOUT_OUTPUT)?,
     }
     let found = of_plan(plan, &Silent)?;
     let mut text = found.text();
     if let Some(file) = out {
-        cli.write_file(file, found.table().to_csv(&plan.scene.provenance())?)?;
+        cli.write_file(file, found.table().to_csv(&plan.file.provenance())?)?;
         text += &format!("wrote {}\n", file.display());
     }
     let file = out.map(|file| file.display().to_string());
     let object = json!({
-        "version": crate::VERSION, "scene_hash": plan.scene.hash, "by_snr": points(&found.by_snr).objects(),
+        "version": crate::VERSION, "scene_hash": plan.file.hash, "by_snr": points(&found.by_snr).objects(),
         "by_range": points(&found.by_range).objects(),
         "files": file,
     });
@@ -64,7 +64,7 @@ pub(super) fn budget(
         None => cli.refuse_idle(scene, WITHOUT_OUTPUT)?,
     }
     let ranges_m = if range_m.is_empty() {
-        scan_ranges_m(&plan.scene.content)
+        scan_ranges_m(plan.scene())
     } else {
         range_m.to_vec()
     };
@@ -72,14 +72,14 @@ pub(super) fn budget(
     let mut text = found.text();
     let mut files = Vec::new();
     if let Some(folder) = out {
-        let of = (scene::Outputs::default(), plan.scene.provenance());
+        let of = (scene::Outputs::default(), plan.file.provenance());
         let list =
             |files: &mut Outputs| files.table("budget", Some(&found), |found| Ok(found.table()));
         files = cli.write(folder, existing, of, list)?;
         text += &format!("wrote {}\n", folder.join("budget.csv").display());
     }
     let object = json!({
-        "version": crate::VERSION, "scene_hash": plan.scene.hash, "range_m": found.range_m, "rows": found.rows,
+        "version": crate::VERSION, "scene_hash": plan.file.hash, "range_m": found.range_m, "rows": found.rows,
         "limits": found.limits.values.iter().copied().collect::<BTreeMap<_, _>>(), "warnings": found.warnings, "files": paths(&files),
     });
     cli.say(&object, &text)

@@ -86,7 +86,7 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
         .map(|scene| Plan::new(scene, Target::Map))
         .transpose()?;
     args.folder.prepare(cli, |files| list(args, None, files))?;
-    let of_plan = plan.as_ref().map(|plan| &plan.scene.content);
+    let of_plan = plan.as_ref().map(|plan| plan.scene());
     let (gate, note) = gate_of(scans.first(), args.air.gate_std, of_plan)?;
     notes.extend(note.map(str::to_owned));
     let mut settings = args.settings(cli, of_plan, gate);

@@ -6,7 +6,7 @@ use super::options::IN_MEMORY;
 use crate::Error;
 use crate::io::raw::RawFormat;
 use crate::measure::recorded::{self, NoiseLevel, RayTable, Recorded, RecordedOptions};
-use crate::plan::Plan;
+use crate::plan::{Plan, Target};
 use crate::write;
 use clap::Args;
 use serde_json::json;
@@ -54,7 +54,8 @@ pub(super) fn estimate(args: &EstimateArgs, cli: &Cli) -> Result<(), Error> {
     records.is_reversed = args.towards;
     let rays = args.rays.as_deref().map(RayTable::read).transpose()?;
     let observer = cli.observer();
-    let (plan, is_own) = recorded::plan(scene, &records, &*observer)?;
+    let (scene, is_own) = recorded::scene_of_records(scene, &records, &*observer)?;
+    let plan = Plan::new(scene, Target::Map)?;
     args.folder
         .prepare_names(cli, &write::recorded_names(&plan)?)?;
     let options = RecordedOptions {
@@ -65,8 +66,8 @@ pub(super) fn estimate(args: &EstimateArgs, cli: &Cli) -> Result<(), Error> {
     };
     let found = recorded::estimate((&plan, is_own), &mut records, &options, &*observer)?;
     let (text, results) = told(&plan, &found, records.records);
-    let of = (plan.scene.content.outputs, plan.scene.provenance());
-    let object = json!({ "scene_hash": plan.scene.hash, "data": args.data.to_string_lossy(), "results": results });
+    let of = (plan.scene().outputs, plan.file.provenance());
+    let object = json!({ "scene_hash": plan.file.hash, "data": args.data.to_string_lossy(), "results": results });
     args.folder.finish(
         cli,
         of,

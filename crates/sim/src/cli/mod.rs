@@ -337,10 +337,10 @@ fn check(args: &CheckArgs, cli: &Cli) -> Result<(), Error> {
     if cli.quiet && !cli.json {
         return Ok(());
     }
-    let ranges_m = scan_ranges_m(&plan.scene.content);
+    let ranges_m = scan_ranges_m(plan.scene());
     let snr_db = snr_without_screens_db(&plan, &ranges_m)?;
     // What only phase screens could tell is not told.
-    let is_less = plan.runs(Stage::PhaseScreens) && model(&plan.scene.content) == Model::MonteCarlo;
+    let is_less = plan.runs(Stage::PhaseScreens) && model(plan.scene()) == Model::MonteCarlo;
     let mut object = plan_json(&plan);
     object["budget"] =
         json!({ "range_m": ranges_m, "snr_db": snr_db, "independent_paths": is_less });
@@ -397,7 +397,7 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
         text.extend(detected.map(|found| format!("{share:<44} {}\n", digits(found))));
         object["retrieval"] = json!({ "errors": errors.objects(), "detected": detected });
     }
-    let of = (plan.scene.content.outputs, plan.scene.provenance());
+    let of = (plan.scene().outputs, plan.file.provenance());
     io.folder.finish(
         cli,
         of,
@@ -425,7 +425,7 @@ fn plan_json(plan: &Plan) -> Value {
     });
     let stages: Vec<Value> = stages.collect();
     json!({
-        "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.content.seed,
-        "scan": plan.schedule(), "stages": stages, "core_s": plan.core_s, "memory_bytes": plan.memory_bytes(), "warnings": plan.warnings,
+        "version": crate::VERSION, "scene_hash": plan.file.hash, "seed": plan.scene().seed,
+        "scan": plan.schedule(), "stages": stages, "core_s": plan.core_s(), "memory_bytes": plan.memory_bytes(), "warnings": plan.warnings,
     })
 }

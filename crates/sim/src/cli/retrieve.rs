@@ -321,7 +321,7 @@ impl Input {
         }
         let keeps_spectra = args.method == Method::Envelope;
         let scans = args.scans.read(path, stated, keeps_spectra, observer)?;
-        let known = scans.signals.as_ref().map(|signals| &signals.plan.scene);
+        let known = scans.signals.as_ref().map(|signals| &signals.plan.file);
         let scene = match (known.or(stated), scans.maps.first()) {
             (Some(scene), _) => Some(scene.clone()),
             (None, Some(scan)) => retrieve::scene_of(scan, observer)?,
@@ -423,17 +423,17 @@ fn of_signals(
         scans,
         spectra,
     } = signals;
-    let own = SceneResponse::of_scene(&plan.scene, &Silent)?;
+    let own = SceneResponse::of_scene(&plan.file, &Silent)?;
     let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
     let mut first_line = 0;
     for (mut scan, measured) in maps.into_iter().zip(&scans) {
-        scan.azimuth_rad = Some(plan.scene.content.scan.azimuth_rad);
+        scan.azimuth_rad = Some(plan.scene().scan.azimuth_rad);
         args.refuse_idle_on(&scan, velocities)?;
-        let (gate, _) = gate_of(Some(&scan), args.air.gate_std, Some(&plan.scene.content))?;
+        let (gate, _) = gate_of(Some(&scan), args.air.gate_std, Some(plan.scene()))?;
         let (mut one, implausible) = retrieve::retrieve_map(
             scan,
             args.method,
-            args.options(Some(&plan.scene), gate),
+            args.options(Some(&plan.file), gate),
             velocities,
         )?;
         if let Some(reason) = implausible {

@@ -50,7 +50,7 @@ impl SceneNoise {
     /// # Errors
     /// What the crates refuse.
     pub fn new(plan: &Plan, observer: &dyn Observer) -> Result<Self, Error> {
-        let mut scene = plan.scene.in_still_air()?.content;
+        let mut scene = plan.file.in_still_air()?.content;
         scene.seed ^= SEED_BIT;
         let middle_rad = 0.5 * (scene.scan.elevation_min_rad + scene.scan.elevation_max_rad);
         let half_rad = 0.5 * LINES * scene.scan.elevation_step_rad;
@@ -60,7 +60,7 @@ impl SceneNoise {
             / scene.scan.elevation_step_rad
             + 1.0;
         scene.scan.realisations = (LINES_OF_ALL / lines).ceil() as usize;
-        let still = Plan::new(plan.scene.with(scene)?, Target::Map)?;
+        let still = Plan::without_stages(plan.file.with(scene)?, Target::Map)?;
         let maps = velocities(&still, observer)?;
         Ok(Self::of_maps(
             still.geometry.gate_range_m.clone(),

@@ -41,7 +41,7 @@ pub struct BeamWind {
 /// # Errors
 /// What the estimators or the wind refuse; a checked scene gives none.
 pub fn beam_winds(plan: &Plan, map: &VelocityEstimates) -> Result<Option<Vec<BeamWind>>, Error> {
-    let pattern = &plan.scene.content.scan.pattern;
+    let pattern = &plan.scene().scan.pattern;
     if !matches!(pattern, Pattern::Vad { .. } | Pattern::Dbs { .. }) {
         return Ok(None);
     }
@@ -103,7 +103,7 @@ pub(crate) fn mean_wind_m_s(
     plan: &Plan,
     velocity_m_s: &Array2<f64>,
 ) -> Result<Option<[f64; 3]>, Error> {
-    let pattern = &plan.scene.content.scan.pattern;
+    let pattern = &plan.scene().scan.pattern;
     if !matches!(pattern, Pattern::Vad { .. } | Pattern::Dbs { .. }) {
         return Ok(None);
     }

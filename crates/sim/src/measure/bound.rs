@@ -6,13 +6,14 @@
 
 use crate::interpolation::interpolate;
 use crate::io::Table;
+use crate::measure::map_stages::bound_bytes;
 use crate::measure::ray_information::RayInformation;
 use crate::measure::region::{places, region_radius};
 use crate::measure::scan::Scanner;
-use crate::plan::Plan;
-use crate::plan::estimators;
+use crate::measure::scan_stages::wind_bytes;
+use crate::plan::{Plan, PlannedStage, Stage, estimators, fit};
 use crate::progress::Observer;
-use crate::{Error, scene::NoiseModel};
+use crate::{Error, machine, scene::NoiseModel};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use wakescope_estimate::{
@@ -49,6 +50,39 @@ pub struct SceneBound {
     pub by_range: Vec<BoundPoint>,
 }
 
+/// Whether the memory for the bound of a plan's scene is available: matrices of the samples of a
+/// record by as many.
+///
+/// # Errors
+/// Fails with [`Error::TooLarge`] for more than nine tenths of what the machine has available.
+pub fn fits(plan: &Plan) -> Result<(), Error> {
+    fits_in(
+        plan,
+        machine::available_memory_bytes().unwrap_or(f64::INFINITY),
+    )
+}
+
+/// Whether the memory for the bound is within a given amount, bytes.
+///
+/// # Errors
+/// As [`fits`].
+fn fits_in(plan: &Plan, available_bytes: f64) -> Result<(), Error> {
+    let remedy = "fewer estimator.window_samples";
+    let mut stages = Vec::new();
+    for stage in &plan.stages {
+        if let Stage::PhaseScreens | Stage::Efficiency | Stage::LinesOfSight = stage.stage {
+            stages.push(PlannedStage {
+                remedy: remedy.into(),
+                ..stage.clone()
+            });
+        }
+    }
+    let matrices = PlannedStage::running(Stage::Estimates, String::new());
+    let bytes = wind_bytes(plan) + bound_bytes(plan);
+    stages.push(matrices.with_memory(bytes, 0.0, remedy.into()));
+    fit::refuse_too_large(&stages, available_bytes)
+}
+
 /// What all points share.
 struct Setting<'p> {
     of_rays: RayInformation<'p>,
@@ -60,7 +94,7 @@ struct Setting<'p> {
 
 impl<'p> Setting<'p> {
     fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
-        let scene = &plan.scene.content;
+        let scene = plan.scene();
         if scene.detector.noise == NoiseModel::None {
             return Err(Error::NoBound);
         }
@@ -265,6 +299,32 @@ mod tests {
         })
         .map(|r| (r[0], r[column]))
         .collect()
+    }
+
+    #[test]
+    fn bound_of_windows_whose_matrices_do_not_fit_is_refused_and_the_remedy_fits() {
+        let plan = |text: &str| {
+            let file = SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap();
+            Plan::new(file, Target::Run).unwrap()
+        };
+        let text = |window: &str| {
+            format!(
+                "[scan]\nrange_max_m = 9000.0\nelevation_max_rad = 0.01\n[estimator]\nwindow_samples = {window}\npadded_samples = 32768\n"
+            )
+        };
+        let long = plan(&text("13000"));
+        long.fits_in(8e9).unwrap();
+        let refused = fits_in(&long, 8e9).unwrap_err().to_string();
+        // Some six matrices of 13 000 x 13 000 numbers.
+        assert!(
+            refused.contains("needs 8.") && refused.contains("--allow-large"),
+            "{refused}"
+        );
+        assert!(
+            refused.contains("fewer estimator.window_samples"),
+            "{refused}"
+        );
+        fits_in(&plan(&text("6500")), 8e9).unwrap();
     }
 
     #[test]
@@ -494,7 +554,7 @@ mod tests {
         let gates = plan(
             "[estimator]\nwindow_samples = 24\nwindow_step_samples = 8\n[scan]\nrange_min_m = 300.0\n",
         );
-        let gate_m = places(&gates.scene.content, &gates.geometry)
+        let gate_m = places(gates.scene(), &gates.geometry)
             .unwrap()
             .gate_ranges_m()[10];
         let middle_m = gate_m + 0.5 * step_m;

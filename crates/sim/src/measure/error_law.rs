@@ -26,7 +26,7 @@ const OUTLIER: f64 = 6.0;
 /// # Errors
 /// What the crates refuse; a checked scene gives none.
 pub(crate) fn shared_cells(plan: &Plan) -> Result<[f64; 2], Error> {
-    let (scene, g) = (&plan.scene.content, &plan.geometry);
+    let (scene, g) = (plan.scene(), &plan.geometry);
     let middle_m = g
         .gate_range_m
         .get(g.gate_range_m.len() / 2)

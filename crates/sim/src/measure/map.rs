@@ -1,7 +1,6 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
 use crate::Error;
-use crate::measure::air::{radial_velocity_m_s, seen_m_s};
 use crate::measure::error_law::{ErrorLaw, ScanErrors, shared_cells};
 use crate::measure::gate_estimates::GateSums;
 use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints};
@@ -9,6 +8,7 @@ use crate::measure::ray_information::range_filter;
 use crate::measure::region::places;
 use crate::measure::scan::Scanner;
 use crate::plan::estimators;
+use crate::plan::line_wind::{radial_velocity_m_s, weighted_at_gates_m_s};
 use crate::plan::{Plan, Stage};
 use crate::progress::Observer;
 use crate::scene::DetectorSignal;
@@ -91,7 +91,7 @@ struct Mapper<'p, S> {
 
 impl<'p, S: Sample> Mapper<'p, S> {
     fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
-        let (scene, g) = (&plan.scene.content, &plan.geometry);
+        let (scene, g) = (plan.scene(), &plan.geometry);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let places = places(scene, g)?;
         let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
@@ -161,7 +161,7 @@ impl<'p, S: Sample> Mapper<'p, S> {
         map.v_mean_m_s = &map.v_pulse_m_s + &map.bias_m_s;
         map.std_m_s = statistics.mapv(|s| s.std_m_s);
         map.rms_m_s = statistics.mapv(|s| s.rms_m_s);
-        let (low_m_s, high_m_s) = estimators::sampling(&plan.scene.content)?.velocity_limits_m_s();
+        let (low_m_s, high_m_s) = estimators::sampling(plan.scene())?.velocity_limits_m_s();
         let half_band_m_s = 0.5 * (high_m_s - low_m_s);
         map.law = ErrorLaw::new(&map.scans, shared_cells(plan)?, half_band_m_s);
         let unknown = || Array2::from_elem(map.count.dim(), f64::NAN);
@@ -194,7 +194,7 @@ fn truth(
             )?));
         let line = &scanner.lines[i];
         for (filter, cells) in [(&by_pulse, &mut pulse_m_s), (&by_gate, &mut gate_m_s)] {
-            cells.row_mut(i).assign(&Array1::from(seen_m_s(
+            cells.row_mut(i).assign(&Array1::from(weighted_at_gates_m_s(
                 filter,
                 g,
                 &line.radial_velocity_m_s,
@@ -311,7 +311,7 @@ pub(crate) fn of_plans(
     let Some(first) = plans.first() else {
         return Ok(Vec::new());
     };
-    match first.scene.content.detector.signal {
+    match first.scene().detector.signal {
         DetectorSignal::IntermediateFrequency => {
             estimates::<f64>(plans, scanner, observer, |_| (), seen)
         }

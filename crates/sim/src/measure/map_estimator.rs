@@ -38,7 +38,7 @@ pub(crate) type WindowSums<'a, S> = ScanSums<'a, S, dyn Statistic<S>>;
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn places_of(plan: &Plan, record_elevation_rad: &[f64]) -> Result<ScanGeometry, Error> {
-    let (scene, samples) = (&plan.scene.content, plan.geometry.samples);
+    let (scene, samples) = (plan.scene(), plan.geometry.samples);
     let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
     Ok(ScanGeometry::new(
         &sampling,
@@ -58,7 +58,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         layer_snr: &[(f64, f64)],
         places: &ScanGeometry,
     ) -> Result<Self, Error> {
-        let scene = &plan.scene.content;
+        let scene = plan.scene();
         let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
         let of_rays = RayInformation::new(plan, layer_snr)?;
         let radius = region_radius(&of_rays, places)?;
@@ -80,7 +80,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
     ) -> Result<WindowSums<'_, S>, Error> {
         let (statistic, gates) = (
             &*self.tools.statistic,
-            estimators::gates(&self.plan.scene.content)?,
+            estimators::gates(self.plan.scene())?,
         );
         Ok(match held {
             None => ScanSums::new(statistic, &gates, places, self.plan.geometry.samples)?,
@@ -163,7 +163,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
             .iter()
             .map(region)
             .collect::<Result<Vec<RegionNoise>, Error>>()?;
-        let rate = self.plan.scene.content.estimator.false_alarm;
+        let rate = self.plan.scene().estimator.false_alarm;
         let threshold = if rate > 0.0 {
             self.thresholds(test, &regions)?
         } else {
@@ -182,7 +182,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
     fn thresholds(&self, test: &NoiseTest, regions: &[RegionNoise]) -> Result<Vec<f64>, Error> {
         let (density_a2, rate) = (
             self.tools.noise.density_a2,
-            self.plan.scene.content.estimator.false_alarm,
+            self.plan.scene().estimator.false_alarm,
         );
         // Many points share their windows.
         let mut known = HashMap::new();

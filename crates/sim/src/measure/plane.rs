@@ -3,23 +3,51 @@
 use crate::Error;
 use crate::interpolation::linspace;
 use crate::io::{CrossPlanes, OPEN_EDGES};
-use crate::measure::sizes::PLANE_POINTS;
-use crate::plan::Plan;
+use crate::plan::{Plan, PlannedStage, Stage, Target};
 use ndarray::Array3;
+
+/// Points of the cross-plane across and up.
+pub(crate) const POINTS: [usize; 2] = [161, 81];
+
+/// Keys that reduce the memory of profile and cross-plane.
+pub(crate) const FEWER_POINTS: &str = "fewer outputs.profile_points, or outputs.flow = false";
+
+/// Whether a plan has the wind on a cross-plane.
+pub(crate) fn is_wanted(plan: &Plan) -> bool {
+    plan.target == Target::Run && plan.scene().outputs.flow
+}
+
+/// The stage of the cross-plane.
+pub(crate) fn planned(plan: &Plan) -> PlannedStage {
+    if !is_wanted(plan) {
+        return PlannedStage::skipped(Stage::CrossPlane, "not asked for");
+    }
+    if plan.scene().is_calm() {
+        return PlannedStage::skipped(Stage::CrossPlane, "flow.kind is \"calm\"");
+    }
+    let [across, up] = POINTS;
+    let points = (across * up) as f64;
+    // Positions and velocities are in memory at work; two components are kept.
+    PlannedStage::running(Stage::CrossPlane, format!("{across} x {up} points")).with_memory(
+        points * 48.0,
+        points * 16.0,
+        FEWER_POINTS.into(),
+    )
+}
 
 /// The wind at the start of the scan, over the ground that the scan covers.
 ///
 /// # Errors
 /// What the wind refuses; a checked scene gives none.
 pub(crate) fn cross_plane(plan: &Plan) -> Result<CrossPlanes, Error> {
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let top_rad = scene.scan.elevation_max_rad.max(0.0);
     let bottom_rad = scene.scan.elevation_min_rad.abs().max(top_rad.abs());
     let far_m = scene.scan.range_max_m;
     let (low_y_m, high_y_m) = (scene.scan.range_min_m * bottom_rad.cos(), far_m);
     let top_m = (scene.scan.lidar_height_m + far_m * top_rad.sin()).max(0.1 * far_m);
-    let y_m = linspace(low_y_m, high_y_m, PLANE_POINTS.0);
-    let z_m = linspace(0.0, top_m, PLANE_POINTS.1);
+    let y_m = linspace(low_y_m, high_y_m, POINTS[0]);
+    let z_m = linspace(0.0, top_m, POINTS[1]);
     let points_m: Vec<[f64; 3]> = z_m
         .iter()
         .flat_map(|&z| y_m.iter().map(move |&y| [0.0, y, z]))

@@ -4,22 +4,24 @@
 //! focus (`every_output_has_the_same_ratio_through_a_focus`).
 
 use crate::Error;
-use crate::interpolation::interpolate;
+use crate::interpolation::{interpolate, linspace};
 use crate::measure::efficiency_model::{
     MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence,
 };
+use crate::measure::plane;
 use crate::memo::Memo;
-use crate::plan::Setup;
 use crate::plan::instrument::Instrument;
-use crate::plan::{Plan, Stage};
+use crate::plan::{Plan, PlannedStage, Stage, Target};
 use crate::progress::Observer;
 use crate::scene::{ReceiverPath, Scene, SnrReference, hash_of};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wakescope_optics::air::StructureTable;
-use wakescope_optics::plan::{DOUBTFUL_LOSS, Model};
+use wakescope_optics::plan::{DOUBTFUL_LOSS, Model, Plan as ScreenPlan};
 use wakescope_optics::theory::{bistatic_efficiency_with, free_space_efficiency};
-use wakescope_optics::{EfficiencyProfile, Misalignment, Stop, curved_ranges_m};
+use wakescope_optics::{
+    EfficiencyProfile, Focus, Misalignment, Stop, Telescope, curved_ranges_m, theory,
+};
 
 /// Efficiency (19) and signal-to-noise ratio (14) at the same ranges.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,25 +38,138 @@ pub struct RangeProfile {
     pub lost_power_fraction: Option<f64>,
 }
 
-/// The curves of some scenes.
+/// Efficiency curves, phase screens and their plans that scenes with the same path share.
 #[derive(Debug, Default)]
-pub(crate) struct Efficiencies {
+pub(crate) struct EfficiencyMemo {
     layers: Memo<EfficiencyProfile>,
     screens: Memo<Screens>,
+    pub(crate) screen_plans: Memo<Vec<ScreenPlan>>,
 }
 
-impl Efficiencies {
-    /// How many were computed.
+impl EfficiencyMemo {
+    /// Number of efficiency curves that were computed.
     pub(crate) fn computed(&self) -> usize {
         self.layers.len()
     }
+}
+
+/// Ranges of the table of the efficiency, m; none if no table is requested.
+pub(crate) fn table_ranges_m(plan: &Plan) -> Vec<f64> {
+    if !plan.target.has_profile() {
+        return Vec::new();
+    }
+    let o = &plan.scene().outputs;
+    linspace(
+        o.profile_range_min_m,
+        o.profile_range_max_m,
+        o.profile_points,
+    )
+}
+
+/// Ranges between which the efficiency of the layers is interpolated, m; none if the signals need
+/// none.
+pub(crate) fn layer_ranges_m(plan: &Plan) -> Vec<f64> {
+    let is_fixed = matches!(plan.scene().detector.snr, SnrReference::Fixed { .. });
+    if is_fixed || plan.target == Target::Efficiency {
+        return Vec::new();
+    }
+    let g = &plan.geometry;
+    let last_m = g.first_layer_range_m + g.layers as f64 * g.layer_thickness_m;
+    let telescope = &plan.instrument.telescope;
+    curved_ranges_m(telescope, g.first_layer_range_m, last_m, OF_QUADRATURES)
+}
+
+/// The stage of the efficiency.
+///
+/// # Errors
+/// Fails if the Fresnel number of the beam is too large for the quadratures.
+pub(crate) fn planned(plan: &Plan) -> Result<PlannedStage, Error> {
+    let scene = plan.scene();
+    let telescope = &plan.instrument.telescope;
+    let mut ranges_m = table_ranges_m(plan);
+    ranges_m.extend(layer_ranges_m(plan));
+    refuse_fresnel_numbers(telescope, &ranges_m)?;
+    if let (SnrReference::Fixed { snr_db }, true) = (scene.detector.snr, ranges_m.is_empty()) {
+        let reason = format!("detector.snr fixes {snr_db} dB at every range");
+        return Ok(PlannedStage::skipped(Stage::Efficiency, &reason));
+    }
+    // A table through turbulence has the free-space and the exact bistatic curves beside the Monte
+    // Carlo: mean, scatter and error of each model.
+    let (places, models) = match turbulence(scene) {
+        Some(_) => (16, 5.0),
+        None => (0, 1.0),
+    };
+    let mut quadratures_s = 0.0;
+    for &range_m in &ranges_m {
+        quadratures_s += theory::quadrature_cost_s(telescope, places, range_m);
+    }
+    // Of more ranges than this a curve is made.
+    let computed = (MOST_QUADRATURES as f64 / ranges_m.len().max(1) as f64).min(1.0);
+    let method = match model(scene) {
+        Model::FreeSpace => "free space, by quadrature",
+        Model::ExactBistatic => "independent paths, exact by quadrature",
+        Model::MonteCarlo => "one path out and back, by phase screens",
+    };
+    let reason = format!("{method}, at {} ranges", ranges_m.len());
+    let kept_bytes = ranges_m.len() as f64 * (16.0 + 24.0 * models);
+    Ok(PlannedStage::running(Stage::Efficiency, reason)
+        .with_memory(0.0, kept_bytes, plane::FEWER_POINTS.into())
+        .with_time(quadratures_s * computed))
+}
+
+/// Refuses a beam whose Fresnel number is too large for the quadratures, by the key that reduces it.
+fn refuse_fresnel_numbers(telescope: &Telescope, ranges_m: &[f64]) -> Result<(), Error> {
+    let most = theory::LARGEST_FRESNEL_NUMBER;
+    let mut found = most;
+    let mut range_m = f64::NAN;
+    for &at_m in ranges_m {
+        let number = theory::fresnel_number(telescope, at_m);
+        if number > most && number >= found {
+            found = number;
+            range_m = at_m;
+        }
+    }
+    if range_m.is_nan() {
+        return Ok(());
+    }
+    let excess = format!(
+        "a Fresnel number a^2 |1/R - 1/F| / lambda of at most {most}, for which the efficiency has a quadrature; it is {found:.0} at \
+         {range_m} m"
+    );
+    // Without the focus the number would be this.
+    let rest = theory::fresnel_number(
+        &Telescope {
+            focus: Focus::Collimated,
+            ..*telescope
+        },
+        range_m,
+    );
+    Err(match telescope.focus {
+        Focus::At(focus_m) if rest < most => {
+            // |1/R - 1/F| <= limit from F = 1/(1/R + limit) upwards, of either sign.
+            let shortest_m = range_m * rest / (most + if focus_m > 0.0 { rest } else { -rest });
+            let sign = if focus_m > 0.0 { "from " } else { "to -" };
+            let reason = format!("{excess}: {sign}{:.2} m", 1.01 * shortest_m + 0.01);
+            Error::Key {
+                key: "telescope.focus_m",
+                reason,
+            }
+        }
+        _ => {
+            let largest_m = 0.99 * telescope.aperture_radius_m * (most / found).sqrt();
+            Error::Key {
+                key: "telescope.aperture_radius_m",
+                reason: format!("{excess}: to {largest_m:.4} m"),
+            }
+        }
+    })
 }
 
 /// The optics of a plan along its lines: what is known of them already, and who is told of what is made.
 #[derive(Clone, Copy)]
 pub(crate) struct LineOptics<'a> {
     pub(crate) plan: &'a Plan,
-    pub(crate) known: &'a Efficiencies,
+    pub(crate) known: &'a EfficiencyMemo,
     pub(crate) observer: &'a dyn Observer,
 }
 
@@ -65,7 +180,7 @@ impl LineOptics<'_> {
     /// What the optics refuse, such as a grid too small for the beam; in turbulence that phase screens cross, ranges beyond the signals and
     /// the profile of the scene.
     pub(crate) fn profile_at(&self, range_m: &[f64]) -> Result<RangeProfile, Error> {
-        let (scene, instrument) = (&self.plan.scene.content, &self.plan.instrument);
+        let (scene, instrument) = (self.plan.scene(), &self.plan.instrument);
         let theory = efficiency_by_theory(instrument, range_m)?;
         let (mut others, mut lost_power_fraction) = (Vec::new(), None);
         let mut efficiency = theory.clone();
@@ -101,7 +216,7 @@ impl LineOptics<'_> {
     /// As [`Self::profile_at`].
     pub(crate) fn efficiency_at(&self, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
         let theory = efficiency_by_theory(&self.plan.instrument, range_m)?;
-        match model(&self.plan.scene.content) {
+        match model(self.plan.scene()) {
             Model::MonteCarlo => Ok(self.across_screens(&theory)?.0[0].clone()),
             _ => Ok(theory),
         }
@@ -112,7 +227,7 @@ impl LineOptics<'_> {
         let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
         self.known
             .layers
-            .of(cause(&self.plan.scene.content, &ranges_m), || {
+            .get_or_make(cause(self.plan.scene(), &ranges_m), || {
                 self.observer.begin(Stage::Efficiency, 1);
                 let profile = self.efficiency_at(&ranges_m)?;
                 self.observer.end();
@@ -125,7 +240,7 @@ impl LineOptics<'_> {
         let range_m = curved_ranges_m(&self.plan.instrument.telescope, from_m, to_m, OF_SCREENS);
         self.known
             .screens
-            .of(cause(&self.plan.scene.content, &range_m), || {
+            .get_or_make(cause(self.plan.scene(), &range_m), || {
                 self.run_screens(range_m)
             })
     }
@@ -137,11 +252,7 @@ impl LineOptics<'_> {
         theory: &EfficiencyProfile,
     ) -> Result<([EfficiencyProfile; 2], f64), Error> {
         let (mut found, mut done, mut lost) = ([const { Vec::new() }; 6], 0, 0f64);
-        for (ends_m, inside) in stretches(
-            &self.plan.scene.content,
-            &self.plan.geometry,
-            &theory.range_m,
-        ) {
+        for (ends_m, inside) in stretches(self.plan.scene(), &self.plan.geometry, &theory.range_m) {
             let screens = self.screens(ends_m)?;
             lost = lost.max(screens.lost_power_fraction);
             if theory.range_m.get(done) != inside.first() {
@@ -155,7 +266,7 @@ impl LineOptics<'_> {
             }
         }
         if let Some(&range_m) = theory.range_m.get(done) {
-            let o = &self.plan.scene.content.outputs;
+            let o = &self.plan.scene().outputs;
             let (first_m, last_m) = (o.profile_range_min_m, o.profile_range_max_m);
             return Err(wakescope_optics::Error::Extrapolation {
                 range_m,
@@ -180,11 +291,8 @@ impl LineOptics<'_> {
     /// # Errors
     /// What the optics refuse, such as a grid too small for the beam.
     fn run_screens(&self, range_m: Vec<f64>) -> Result<Screens, Error> {
-        let (scene, instrument, observer) = (
-            &self.plan.scene.content,
-            &self.plan.instrument,
-            self.observer,
-        );
+        let (scene, instrument, observer) =
+            (self.plan.scene(), &self.plan.instrument, self.observer);
         let t = turbulence(scene).unwrap_or_default();
         observer.begin(Stage::PhaseScreens, t.realisations as u64);
         let mut seen = 0;
@@ -252,8 +360,8 @@ impl LineOptics<'_> {
 }
 
 /// Mean signal-to-noise ratio (14) in the detector band at the ranges of an efficiency, dB, or what the scene fixes.
-pub(crate) fn snr_db(setup: &Setup, efficiency: &EfficiencyProfile) -> Result<Vec<f64>, Error> {
-    let (scene, instrument) = (&setup.scene.content, &setup.instrument);
+pub(crate) fn snr_db(plan: &Plan, efficiency: &EfficiencyProfile) -> Result<Vec<f64>, Error> {
+    let (scene, instrument) = (plan.scene(), &plan.instrument);
     let snr_db = |(&range_m, &mean): (&f64, &f64)| match scene.detector.snr {
         SnrReference::Fixed { snr_db } => Ok(snr_db),
         _ => {
@@ -351,7 +459,6 @@ mod tests {
     use super::*;
     use crate::measure::bound::bound;
     use crate::measure::budget::Budget;
-    use crate::plan::Target;
     use crate::progress::Silent;
     use crate::run::run;
     use crate::scene::SceneFile;
@@ -367,7 +474,7 @@ mod tests {
         Plan::new(file, target).unwrap()
     }
 
-    fn optics<'a>(plan: &'a Plan, known: &'a Efficiencies) -> LineOptics<'a> {
+    fn optics<'a>(plan: &'a Plan, known: &'a EfficiencyMemo) -> LineOptics<'a> {
         LineOptics {
             plan,
             known,
@@ -378,7 +485,7 @@ mod tests {
     /// (14) as it is written, for a return that changes slowly over the pulse, in even air.
     fn of_14(plan: &Plan, range_m: f64, efficiency: f64) -> f64 {
         const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
-        let (scene, air) = (&plan.scene.content, &plan.scene.content.atmosphere);
+        let (scene, air) = (plan.scene(), &plan.scene().atmosphere);
         let photon_j = 6.626_070_15e-34 * SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m;
         let photons = scene.detector.quantum_efficiency * scene.pulse.energy_j / photon_j;
         let area_m2 = std::f64::consts::PI * scene.telescope.aperture_radius_m.powi(2);
@@ -396,7 +503,7 @@ mod tests {
         let of_bound = bound(plan, &Silent).unwrap().by_range;
         let ranges_m: Vec<f64> = of_bound.iter().map(|p| p.range_m).collect();
         let budget = Budget::new(plan, &ranges_m, &Silent).unwrap();
-        let profile = optics(plan, &Efficiencies::default())
+        let profile = optics(plan, &EfficiencyMemo::default())
             .profile_at(&ranges_m)
             .unwrap();
         let all = of_bound.iter().zip(budget.snr_db()).zip(&profile.snr_db);
@@ -456,7 +563,7 @@ mod tests {
                 assert!((a - b).abs() < 1e-9, "{a} {b}");
             }
             let middle = result.middle.unwrap();
-            let there = optics(&plan, &Efficiencies::default())
+            let there = optics(&plan, &EfficiencyMemo::default())
                 .efficiency_at(&[middle.range_m])
                 .unwrap();
             assert!((middle.efficiency / there.mean[0] - 1.0).abs() < 1e-12);
@@ -478,7 +585,7 @@ mod tests {
                 .chain([first_m, last_m])
                 .collect();
             ranges_m.sort_by(f64::total_cmp);
-            let found: usize = stretches(&plan.scene.content, &plan.geometry, &ranges_m)
+            let found: usize = stretches(plan.scene(), &plan.geometry, &ranges_m)
                 .iter()
                 .map(|s| s.1.len())
                 .sum();
@@ -491,14 +598,14 @@ mod tests {
         let more = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-13\ngrid_points = 160\n\
              grid_spacing_m = 0.0022\nlayers = 5\nrealisations = 8\n[outputs]\nprofile_range_max_m = 560.0\n";
         let plan = plan("focus_m = 300.0", [200.0, 500.0], more, Target::Map);
-        let (scene, instrument) = (&plan.scene.content, &plan.instrument);
+        let (scene, instrument) = (plan.scene(), &plan.instrument);
         let (ends_m, _) = stretches(scene, &plan.geometry, &[300.0])[0];
         let nodes_m = curved_ranges_m(&instrument.telescope, ends_m[0], ends_m[1], OF_SCREENS);
         let between_m: Vec<f64> = nodes_m.windows(2).map(|r| 0.5 * (r[0] + r[1])).collect();
         let mut all_m: Vec<f64> = nodes_m.iter().chain(&between_m).copied().collect();
         all_m.sort_by(f64::total_cmp);
         // One run at all of them has the same layers and random numbers: what differs is the interpolation.
-        let screens = optics(&plan, &Efficiencies::default())
+        let screens = optics(&plan, &EfficiencyMemo::default())
             .run_screens(all_m.clone())
             .unwrap();
         let ratio = |range_m: &f64| {

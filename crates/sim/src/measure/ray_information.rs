@@ -3,7 +3,7 @@
 //! Check: the stored bound of one window; estimates of whole regions, which no bound may pass.
 
 use crate::Error;
-use crate::plan::Setup;
+use crate::plan::Plan;
 use crate::plan::estimators;
 use crate::scene::NoiseModel;
 use wakescope_estimate::bound::RecordModel;
@@ -13,12 +13,12 @@ use wakescope_signal::RangeFilter;
 const SNR: std::ops::RangeInclusive<f64> = 1e-8..=1e6;
 
 /// Weight of the air about the range of a gate: of the pulse and of the window.
-pub(crate) fn range_filter(setup: &Setup) -> Result<RangeFilter, Error> {
-    let scene = &setup.scene.content;
+pub(crate) fn range_filter(plan: &Plan) -> Result<RangeFilter, Error> {
+    let scene = plan.scene();
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
-    let thickness_m = setup.geometry.layer_thickness_m;
+    let thickness_m = plan.geometry.layer_thickness_m;
     Ok(RangeFilter::gate(
-        &setup.instrument.pulse,
+        &plan.instrument.pulse,
         &window,
         scene.detector.sampling_hz,
         thickness_m,
@@ -27,7 +27,7 @@ pub(crate) fn range_filter(setup: &Setup) -> Result<RangeFilter, Error> {
 
 /// Signal-to-noise ratio of the samples of a scene's records, and the information in windows of them.
 pub(crate) struct RayInformation<'a> {
-    pub(crate) setup: &'a Setup,
+    pub(crate) plan: &'a Plan,
     model: RecordModel,
     by_pulse: RangeFilter,
     by_gate: RangeFilter,
@@ -41,20 +41,16 @@ impl<'a> RayInformation<'a> {
     ///
     /// # Errors
     /// What the crates refuse; a checked scene gives none.
-    pub(crate) fn new(setup: &'a Setup, layer_snr: &[(f64, f64)]) -> Result<Self, Error> {
-        let (scene, g, pulse) = (
-            &setup.scene.content,
-            &setup.geometry,
-            &setup.instrument.pulse,
-        );
+    pub(crate) fn new(plan: &'a Plan, layer_snr: &[(f64, f64)]) -> Result<Self, Error> {
+        let (scene, g, pulse) = (plan.scene(), &plan.geometry, &plan.instrument.pulse);
         let (layer_m, layer_snr) = layer_snr.iter().copied().unzip();
         let model = estimators::record_model(scene, pulse)?;
         let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
         Ok(Self {
-            setup,
+            plan,
             model,
             by_pulse,
-            by_gate: range_filter(setup)?,
+            by_gate: range_filter(plan)?,
             layer_m,
             layer_snr,
         })
@@ -70,7 +66,7 @@ impl<'a> RayInformation<'a> {
 
     /// Information on the velocity, 1/(m/s)^2, in 1, 2, .. `count` windows about a range, each sample having the ratio that it sees.
     pub(crate) fn at(&self, range_m: f64, count: usize) -> Result<Vec<f64>, Error> {
-        let (scene, g) = (&self.setup.scene.content, &self.setup.geometry);
+        let (scene, g) = (self.plan.scene(), &self.plan.geometry);
         if scene.detector.noise == NoiseModel::None {
             return self.of_snr(*SNR.end(), count);
         }
@@ -90,11 +86,9 @@ impl<'a> RayInformation<'a> {
     /// The same where all samples have one signal-to-noise ratio.
     pub(crate) fn of_snr(&self, snr: f64, count: usize) -> Result<Vec<f64>, Error> {
         let snr = snr.clamp(*SNR.start(), *SNR.end());
-        Ok(self.model.information(
-            &estimators::gates(&self.setup.scene.content)?,
-            count,
-            |_| snr,
-        )?)
+        Ok(self
+            .model
+            .information(&estimators::gates(self.plan.scene())?, count, |_| snr)?)
     }
 }
 

@@ -52,7 +52,7 @@ pub(crate) fn region_radius(
     of_rays: &RayInformation<'_>,
     geometry: &ScanGeometry,
 ) -> Result<Radius, Error> {
-    let estimator = &of_rays.setup.scene.content.estimator;
+    let estimator = &of_rays.plan.scene().estimator;
     let RegionRadius::Target {
         standard_deviation_m_s,
         largest_m,

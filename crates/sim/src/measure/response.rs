@@ -32,7 +32,7 @@ impl SceneResponse {
     /// # Errors
     /// What the efficiency refuses; a checked scene gives none.
     pub fn of_scene(scene: &SceneFile, observer: &dyn Observer) -> Result<Option<Self>, Error> {
-        let plan = Plan::new(scene.in_still_air()?, Target::Map)?;
+        let plan = Plan::without_stages(scene.in_still_air()?, Target::Map)?;
         Self::new(&plan, Scanner::expected_layer_snr(&plan, observer)?)
     }
 
@@ -42,7 +42,7 @@ impl SceneResponse {
     /// # Errors
     /// What the regions refuse; a checked scene gives none.
     pub(crate) fn new(plan: &Plan, layer_snr: Vec<(f64, f64)>) -> Result<Option<Self>, Error> {
-        let (scene, pulse) = (&plan.scene.content, &plan.instrument.pulse);
+        let (scene, pulse) = (plan.scene(), &plan.instrument.pulse);
         let Some(noise) = noise_kind(scene).filter(|_| scene.pulse.is_gaussian()) else {
             return Ok(None);
         };

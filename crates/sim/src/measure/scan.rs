@@ -2,12 +2,11 @@
 
 use crate::Error;
 use crate::beams::Beam;
-use crate::measure::air::{Air, air_along, air_of_line, known_velocity_m_s};
 use crate::measure::efficiency_model::{drawn_turbulence, stretches};
-use crate::measure::profile::{Efficiencies, LineOptics, efficiency_by_theory};
-use crate::measure::sizes::{AIRS_BYTES, records_at_once};
+use crate::measure::profile::{EfficiencyMemo, LineOptics, efficiency_by_theory};
 use crate::plan::geometry::Geometry;
 use crate::plan::instrument::Instrument;
+use crate::plan::line_wind::{LineWind, known_velocity_m_s, wind_along, wind_of_line};
 use crate::plan::{Plan, Stage};
 use crate::progress::Observer;
 use crate::scene::{DetectorSignal, Scene, SecondTrip, SnrReference};
@@ -22,6 +21,19 @@ use wakescope_signal::efficiency::LayerEfficiency;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::scan::PulseKey;
 use wakescope_signal::{LineOfSight, RangeFilter, Record, Scan, Shot, Simulator};
+
+/// Size of a piece of records, bytes.
+const PIECE_BYTES: usize = 16 << 20;
+/// Size of the winds of a piece, where pulses have their own, bytes.
+pub(crate) const WINDS_BYTES: f64 = (64 << 20) as f64;
+
+/// Records that are in memory at a time: about ten megabytes of them, and enough for every thread.
+pub(crate) fn records_at_once<T>(samples: usize, pulses: usize) -> usize {
+    let record_bytes = samples.max(1) * size_of::<T>();
+    (PIECE_BYTES / record_bytes)
+        .max(rayon::current_num_threads())
+        .min(pulses.max(1))
+}
 
 /// The lines of sight of a scan, and what makes signals of them.
 pub struct Scanner<'a> {
@@ -46,7 +58,7 @@ impl<'a> Scanner<'a> {
     /// # Errors
     /// What the crates refuse; a checked scene gives none.
     pub fn new(plan: &'a Plan, observer: &dyn Observer) -> Result<Self, Error> {
-        Self::with(plan, &Efficiencies::default(), observer)
+        Self::with(plan, &EfficiencyMemo::default(), observer)
     }
 
     /// The same with efficiencies that other scans may share.
@@ -55,10 +67,10 @@ impl<'a> Scanner<'a> {
     /// As [`Scanner::new`].
     pub(crate) fn with(
         plan: &'a Plan,
-        known: &Efficiencies,
+        known: &EfficiencyMemo,
         observer: &dyn Observer,
     ) -> Result<Self, Error> {
-        let (scene, instrument, geometry) = (&plan.scene.content, &plan.instrument, &plan.geometry);
+        let (scene, instrument, geometry) = (plan.scene(), &plan.instrument, &plan.geometry);
         let optics = LineOptics {
             plan,
             known,
@@ -70,7 +82,7 @@ impl<'a> Scanner<'a> {
         let ranges_m: Vec<f64> = geometry.layer_range_m().collect();
         let all: Vec<usize> = (0..geometry.schedule.lines.len()).collect();
         let of_line = |&line: &usize| {
-            let air = air_of_line(plan, &by_pulse, &ranges_m, line)?;
+            let air = wind_of_line(plan, &by_pulse, &ranges_m, line)?;
             observer.advance(1);
             Ok(air)
         };
@@ -115,7 +127,7 @@ impl<'a> Scanner<'a> {
         let Some(line) = self.lines.first() else {
             return Vec::new();
         };
-        layer_snr(&self.plan.scene.content, &self.plan.instrument, line)
+        layer_snr(self.plan.scene(), &self.plan.instrument, line)
     }
 
     /// The same without any wind, for records that were not made here.
@@ -128,16 +140,16 @@ impl<'a> Scanner<'a> {
     ) -> Result<Vec<(f64, f64)>, Error> {
         let optics = LineOptics {
             plan,
-            known: &Efficiencies::default(),
+            known: &EfficiencyMemo::default(),
             observer,
         };
         let radial_velocity_m_s = vec![0.0; plan.geometry.layers];
-        let still = Air {
+        let still = LineWind {
             radial_velocity_m_s,
             spread_m_s: None,
         };
         let line = line_of_sight(&layer_returns(&optics)?, &still, &plan.geometry);
-        Ok(layer_snr(&plan.scene.content, &plan.instrument, &line))
+        Ok(layer_snr(plan.scene(), &plan.instrument, &line))
     }
 
     /// Pulses of one realisation.
@@ -165,7 +177,7 @@ impl<'a> Scanner<'a> {
             // Each pulse brings its air: velocity and weight of each layer.
             let layers = self.plan.geometry.layers.max(1);
             size =
-                size.min((AIRS_BYTES as usize / (16 * layers)).max(rayon::current_num_threads()));
+                size.min((WINDS_BYTES as usize / (16 * layers)).max(rayon::current_num_threads()));
         }
         let mut clipped = Clipped::default();
         for first in (0..self.pulses()).step_by(size) {
@@ -201,7 +213,7 @@ impl<'a> Scanner<'a> {
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
                 let previous = self.previous.as_ref().map(|lines| &lines[line]);
                 let impairment_seed =
-                    stream(self.plan.scene.content.seed, "asides", index(key) as u64).next_u64();
+                    stream(self.plan.scene().seed, "asides", index(key) as u64).next_u64();
                 Shot {
                     line: airs.get(key.pulse).unwrap_or(&self.lines[line]),
                     efficiency,
@@ -209,7 +221,7 @@ impl<'a> Scanner<'a> {
                     impairment_seed,
                 }
             },
-            generator: |key| stream(self.plan.scene.content.seed, "signal", index(key) as u64),
+            generator: |key| stream(self.plan.scene().seed, "signal", index(key) as u64),
             digitiser: self.plan.instrument.digitiser,
         };
         Ok(scan.collect()?)
@@ -227,7 +239,7 @@ impl<'a> Scanner<'a> {
             .map(|pulse| schedule.beam_of_pulse(pulse))
             .collect();
         let along = |beam: &Beam| {
-            let air = air_along(self.plan, beam, &ranges_m)?;
+            let air = wind_along(self.plan, beam, &ranges_m)?;
             let geometry = &self.plan.geometry;
             Ok(line_of_sight(&self.weight_per_m, &air, geometry))
         };
@@ -282,7 +294,7 @@ pub(crate) fn median_snr(layer_snr: &[(f64, f64)]) -> f64 {
 }
 
 /// A line of sight through some air whose layers return `weight_per_m`.
-fn line_of_sight(weight_per_m: &[f64], air: &Air, geometry: &Geometry) -> LineOfSight {
+fn line_of_sight(weight_per_m: &[f64], air: &LineWind, geometry: &Geometry) -> LineOfSight {
     LineOfSight {
         first_range_m: geometry.first_layer_range_m,
         layer_thickness_m: geometry.layer_thickness_m,
@@ -295,7 +307,7 @@ fn line_of_sight(weight_per_m: &[f64], air: &Air, geometry: &Geometry) -> LineOf
 /// states takes the place of all of it.
 fn layer_returns(optics: &LineOptics<'_>) -> Result<Vec<f64>, Error> {
     let plan = optics.plan;
-    let (scene, instrument, geometry) = (&plan.scene.content, &plan.instrument, &plan.geometry);
+    let (scene, instrument, geometry) = (plan.scene(), &plan.instrument, &plan.geometry);
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         let unit = instrument
             .receiver
@@ -313,7 +325,7 @@ fn layer_returns(optics: &LineOptics<'_>) -> Result<Vec<f64>, Error> {
 
 /// The air from which the pulse before comes back at the same time, c/(2 PRF) farther away, at the ranges of the lines.
 fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfSight>>, Error> {
-    let (scene, instrument, geometry) = (&plan.scene.content, &plan.instrument, &plan.geometry);
+    let (scene, instrument, geometry) = (plan.scene(), &plan.instrument, &plan.geometry);
     let Some(SecondTrip {
         radial_velocity_m_s: elsewhere_m_s,
     }) = scene.scan.second_trip
@@ -353,12 +365,12 @@ fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfS
     ))
 }
 
-/// Efficiencies of the layers over their mean, one set for each realisation of the turbulence, if the pulses have their own.
+/// EfficiencyMemo of the layers over their mean, one set for each realisation of the turbulence, if the pulses have their own.
 fn drawn_efficiency(
     optics: &LineOptics<'_>,
     lines: &[LineOfSight],
 ) -> Result<Option<LayerEfficiency>, Error> {
-    let (scene, geometry) = (&optics.plan.scene.content, &optics.plan.geometry);
+    let (scene, geometry) = (optics.plan.scene(), &optics.plan.geometry);
     let (Some(_), Some(line)) = (drawn_turbulence(scene), lines.first()) else {
         return Ok(None);
     };

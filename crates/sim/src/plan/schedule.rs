@@ -33,7 +33,7 @@ pub struct ScanSchedule {
 impl Plan {
     /// The schedule of the scan.
     pub fn schedule(&self) -> ScanSchedule {
-        let (scene, scan) = (&self.scene.content, &self.geometry.schedule);
+        let (scene, scan) = (self.scene(), &self.geometry.schedule);
         let (duration_s, revisit_s) = (scan.duration_s(), scan.revisit_s().unwrap_or(f64::NAN));
         let meanwhile_s = if revisit_s.is_nan() {
             duration_s

@@ -3,25 +3,23 @@
 //! Check: each warning appears with what it warns of, and not without; remedies that it names leave none; the number of empty gates is that
 //! of the gates which a run leaves empty.
 
-use crate::measure::region::places;
-use crate::plan::Setup;
+use crate::plan::Plan;
 use crate::plan::estimators::grid_step_and_bias_m_s;
-use crate::scene::{Estimator, Method, Weighting};
+use crate::scene::{Method, Weighting};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
-use wakescope_estimate::map::PolarPoint;
 
 /// Least shift of velocities by the pulse that is reported, m/s.
 const SHIFT_M_S: f64 = 0.01;
 
-/// What the user should know of a scene whose air has a radial velocity of at most `fastest_m_s`, m/s, but for its phase screens and gates.
+/// What the user should know of a scene, except for its phase screens and gates.
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, Error> {
-    let scene = &setup.scene.content;
+pub(super) fn of_scene(plan: &Plan) -> Result<Vec<String>, Error> {
+    let scene = plan.scene();
     let (e, method) = (&scene.estimator, scene.estimator.method);
-    let mut out = Vec::from_iter(of_fast_air(setup, fastest_m_s));
-    out.extend(of_shifted_pulse(setup));
+    let mut out = Vec::from_iter(of_fast_air(plan));
+    out.extend(of_shifted_pulse(plan));
     if e.padded_samples < 4 * e.window_samples {
         let (step_m_s, off_m_s) = grid_step_and_bias_m_s(scene)?;
         out.push(format!(
@@ -46,7 +44,7 @@ pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, E
     if scene.scan.realisations < 2 {
         out.push("one realisation: no standard deviation can be given".into());
     }
-    out.extend(of_ambiguous_ranges(setup));
+    out.extend(of_ambiguous_ranges(plan));
     let (first_m, blind_m) = (scene.scan.range_min_m, scene.telescope.blind_range_m);
     if first_m < blind_m {
         out.push(format!("scan.range_min_m = {first_m}: nothing is seen up to telescope.blind_range_m, {blind_m} m"));
@@ -55,8 +53,9 @@ pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, E
 }
 
 /// Air that the detector band does not hold.
-fn of_fast_air(setup: &Setup, fastest_m_s: f64) -> Option<String> {
-    let scene = &setup.scene.content;
+fn of_fast_air(plan: &Plan) -> Option<String> {
+    let scene = plan.scene();
+    let fastest_m_s = plan.fastest_m_s;
     let half_band_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
     let seen = if scene.scan.lidar.velocity_m_s == [0.0; 3] {
         ""
@@ -72,9 +71,9 @@ fn of_fast_air(setup: &Setup, fastest_m_s: f64) -> Option<String> {
 }
 
 /// A pulse whose own mean frequency shifts all velocities.
-fn of_shifted_pulse(setup: &Setup) -> Option<String> {
-    let mean_hz = setup.instrument.pulse.mean_frequency_hz();
-    let shift_m_s = -0.5 * setup.scene.content.laser.wavelength_m * mean_hz;
+fn of_shifted_pulse(plan: &Plan) -> Option<String> {
+    let mean_hz = plan.instrument.pulse.mean_frequency_hz();
+    let shift_m_s = -0.5 * plan.scene().laser.wavelength_m * mean_hz;
     (shift_m_s.abs() >= SHIFT_M_S).then(|| {
         format!(
             "pulse.shape: the mean frequency of the pulse is {:.3} MHz beside that of the laser: it shifts every velocity by {shift_m_s:.2} m/s, \
@@ -88,11 +87,11 @@ fn of_shifted_pulse(setup: &Setup) -> Option<String> {
 /// Pulses so close that light of the one before comes back from the ranges of the scan, or a later one is sent meanwhile: a pulse that leaves
 /// a time T after another one has its light come back with that from c T/2 farther away. The signals of a scene hold one pulse each,
 /// as if the one before were long gone.
-fn of_ambiguous_ranges(setup: &Setup) -> Option<String> {
-    let scene = &setup.scene.content;
+fn of_ambiguous_ranges(plan: &Plan) -> Option<String> {
+    let scene = plan.scene();
     let rate_hz = scene.laser.pulse_repetition_hz;
     let apart_m = 0.5 * SPEED_OF_LIGHT_M_S / rate_hz;
-    let (first_s, _) = setup.instrument.pulse.support_s();
+    let (first_s, _) = plan.instrument.pulse.support_s();
     // the front of the pulse lights air beyond the range of the last sample
     let reach_m = 0.5 * SPEED_OF_LIGHT_M_S * (-first_s).max(0.0);
     let farthest_m = scene.scan.range_max_m + reach_m;
@@ -109,109 +108,15 @@ fn of_ambiguous_ranges(setup: &Setup) -> Option<String> {
     })
 }
 
-/// Gates without a window: windows may be farther apart than regions are wide. Regions as large as a standard deviation asks for are not
-/// looked at.
-///
-/// # Errors
-/// What the estimators refuse; a checked scene gives none.
-pub(super) fn of_empty_gates(setup: &Setup) -> Result<Option<String>, Error> {
-    let (scene, g) = (&setup.scene.content, &setup.geometry);
-    let (e, places) = (&scene.estimator, places(scene, g)?);
-    let elevation_rad = places.line_elevation_rad()[0];
-    let is_empty = |range_m: f64| {
-        places
-            .chords(
-                PolarPoint {
-                    range_m,
-                    elevation_rad,
-                },
-                e.largest_radius_m(range_m),
-            )
-            .next()
-            .is_none()
-    };
-    let empty = g
-        .gate_range_m
-        .iter()
-        .filter(|range_m| is_empty(**range_m))
-        .count();
-    let step_m = e.window_step_samples as f64 * scene.sample_spacing_m();
-    let windows_m = places.gate_ranges_m();
-    let nearest_m = |gate_m: &f64| {
-        windows_m
-            .iter()
-            .map(|at_m| (at_m - gate_m).abs())
-            .fold(f64::INFINITY, f64::min)
-    };
-    let farthest_m = g.gate_range_m.iter().map(nearest_m).fold(0.0, f64::max);
-    Ok((empty > 0).then(|| {
-        format!(
-            "{empty} of {} gates of a line have no window in their region and stay empty: windows are {step_m:.2} m apart \
-             (estimator.window_step_samples = {}), regions are {:.2} m wide; none is empty with an {} of {:.3} or more, or \
-             with windows that gates are a multiple of apart",
-            g.gate_range_m.len(),
-            e.window_step_samples,
-            2.0 * e.largest_radius_m(g.gate_range_m[0]),
-            Estimator::RADIUS,
-            // rounded up, so that the number given is good
-            (1000.0 * farthest_m).ceil() / 1000.0,
-        )
-    }))
-}
-
 #[cfg(test)]
 mod tests {
     use crate::plan::{Plan, Target};
     use crate::scene::{Scene, SceneFile};
-    use wakescope_estimate::map::ScanGeometry;
 
     fn plan(change: impl FnOnce(&mut Scene)) -> Plan {
         let mut scene = Scene::default();
         change(&mut scene);
         Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap()
-    }
-
-    #[test]
-    fn gates_that_no_window_is_near_are_counted_with_a_remedy() {
-        let plan = |step: usize, radius_m: f64| {
-            plan(|s| (s.estimator.window_step_samples, s.estimator.radius_m) = (step, radius_m))
-        };
-        for (step, radius_m) in [(16, 2.0), (7, 0.5), (12, 1.5)] {
-            let planned = plan(step, radius_m);
-            let found: Vec<&String> = planned
-                .warnings
-                .iter()
-                .filter(|text| text.contains("have no window"))
-                .collect();
-            let text = found
-                .first()
-                .unwrap_or_else(|| panic!("{step} {radius_m}: {:?}", planned.warnings));
-            let empty: usize = text.split(' ').next().unwrap().parse().unwrap();
-            // by the distances themselves
-            let (g, scene) = (&planned.geometry, &planned.scene.content);
-            let places: ScanGeometry = crate::measure::region::places(scene, g).unwrap();
-            let windows_m = places.gate_ranges_m();
-            let near = |gate_m: &f64| {
-                windows_m
-                    .iter()
-                    .any(|window_m| (window_m - gate_m).abs() <= radius_m + 1e-5)
-            };
-            assert_eq!(
-                empty,
-                g.gate_range_m.iter().filter(|gate_m| !near(gate_m)).count(),
-                "{text}"
-            );
-            let words = text.split("estimator.radius_m of ").nth(1).unwrap();
-            let good_m: f64 = words.split(' ').next().unwrap().parse().unwrap();
-            assert!(
-                plan(step, good_m)
-                    .warnings
-                    .iter()
-                    .all(|text| !text.contains("have no window")),
-                "{text}"
-            );
-        }
-        assert!(plan(1, 1.0).warnings.is_empty());
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub fn envelopes(
     snr: f64,
     found: &mut RetrievedScan,
 ) -> Result<Vec<EnvelopeResult>, Error> {
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let refuse = |reason: &str| Error::Input {
         path: found.scan.path.clone(),
         reason: reason.into(),

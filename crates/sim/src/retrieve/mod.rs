@@ -17,6 +17,7 @@ mod own;
 #[cfg(feature = "plots")]
 mod pictures;
 pub(crate) mod realisations;
+pub(crate) mod stage;
 pub(crate) mod summary;
 mod table;
 mod truth;

@@ -472,8 +472,8 @@ pub fn scan_of_signals(
     ReadScan {
         path: path.to_owned(),
         sweep,
-        reference: crate::io::UtcTime::parse(&plan.scene.content.site.start_utc),
-        scene_toml: Some(plan.scene.toml.clone()),
+        reference: crate::io::UtcTime::parse(&plan.scene().site.start_utc),
+        scene_toml: Some(plan.file.toml.clone()),
         ..scan_of_lines(
             "",
             plan,

@@ -63,7 +63,7 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
     maps: &[Array2<f64>],
     observer: &dyn Observer,
 ) -> Result<Option<SceneRetrieval>, Error> {
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let Some(wanted) = &scene.retrieval else {
         return Ok(None);
     };
@@ -305,7 +305,7 @@ fn tests(
         gate: options.gate.clone(),
         empty_scans: EMPTY_SCANS,
         stride: noise.stride,
-        seed: plan.scene.content.seed,
+        seed: plan.scene().seed,
         ..DetectionSettings::default()
     };
     let empty = noise.empty_scan(plan);

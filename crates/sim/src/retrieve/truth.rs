@@ -62,11 +62,11 @@ pub(super) fn is_there(truth: &VortexResult) -> bool {
 /// # Errors
 /// A simulated flow in which no vortices are found; what the wind refuses.
 pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResult; 2], Error> {
-    match &plan.scene.content.flow {
+    match &plan.scene().flow {
         Flow::VortexPair(pair) => {
             let (air, profile) = (vortex_pair(pair), pair.profile);
             // Behind an aircraft, the wake in the plane of the scan has its age there.
-            let x_m = plan.scene.content.scan.lidar.x_m;
+            let x_m = plan.scene().scan.lidar.x_m;
             let since_s = pair
                 .aircraft
                 .map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
@@ -125,7 +125,7 @@ fn when_passed(
     lines: &[usize],
     centre: impl Fn(f64) -> Result<(f64, f64), Error>,
 ) -> Result<Passage, Error> {
-    let (g, lidar_m) = (&plan.geometry, plan.scene.content.scan.lidar_height_m);
+    let (g, lidar_m) = (&plan.geometry, plan.scene().scan.lidar_height_m);
     let times_s = || {
         lines
             .iter()
@@ -211,7 +211,7 @@ fn vorticity(
 
 /// The place of the scan where the vorticity of a sign is strongest.
 fn strongest(plan: &Plan, time_s: f64, sense: f64) -> Result<(f64, f64), Error> {
-    let (scan, g) = (&plan.scene.content.scan, &plan.geometry);
+    let (scan, g) = (&plan.scene().scan, &plan.geometry);
     let top = g
         .elevation_rad
         .iter()
@@ -334,7 +334,7 @@ mod tests {
             pair.age_tau = 0.5;
         });
         let [left, right] = true_vortices(&moving, &lines(&moving)).unwrap();
-        let Flow::VortexPair(pair) = moving.scene.content.flow else {
+        let Flow::VortexPair(pair) = moving.scene().flow else {
             unreachable!()
         };
         let at = vortex_pair(&pair).centres(left.time_s);

@@ -196,3 +196,10 @@ pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
         }
     }
 }
+
+impl super::Scene {
+    /// Whether the air is at rest everywhere.
+    pub(crate) fn is_calm(&self) -> bool {
+        matches!(self.flow, Flow::Calm {}) && self.added_flows.is_empty()
+    }
+}

@@ -189,7 +189,7 @@ mod tests {
                 );
             }
             let plan = Plan::new(file, Target::Run).unwrap();
-            let root_of_pulses = (plan.scene.content.scan.pulses_per_line as f64).sqrt();
+            let root_of_pulses = (plan.scene().scan.pulses_per_line as f64).sqrt();
             let by_snr = bound(&plan, &Silent).unwrap().by_snr;
             // The first ratio of whole decibels at which the bound is small enough.
             let enough = by_snr

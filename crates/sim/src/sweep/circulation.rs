@@ -27,7 +27,7 @@ impl<'p> Retrieval<'p> {
     /// For a case; nothing where the flow is no pair that turns, or one behind its aircraft, the lines are not one still sweep across
     /// the flight, or the pulse is no Gaussian.
     pub(crate) fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Option<Self> {
-        let scene = &plan.scene.content;
+        let scene = plan.scene();
         let Flow::VortexPair(pair) = scene.flow else {
             return None;
         };
@@ -50,7 +50,7 @@ impl<'p> Retrieval<'p> {
     fn model(&self) -> WakeModel {
         WakeModel {
             profile: self.pair.profile,
-            lidar_height_m: self.plan.scene.content.scan.lidar_height_m,
+            lidar_height_m: self.plan.scene().scan.lidar_height_m,
             ..WakeModel::default()
         }
     }
@@ -64,7 +64,7 @@ impl<'p> Retrieval<'p> {
     /// The circulation that the velocities of a map, m/s, have; NaN where the fit came to no end, nothing where none can be tried.
     pub(crate) fn circulation_m2_s(&self, velocity_m_s: &Array2<f64>) -> Option<f64> {
         let shown = self.response.shown(self.pair.lateral_position_m)?;
-        let (scene, g) = (&self.plan.scene.content, &self.plan.geometry);
+        let (scene, g) = (self.plan.scene(), &self.plan.geometry);
         let step = self.response.gate_step(&g.gate_range_m);
         let range_m: Vec<f64> = g.gate_range_m.iter().copied().step_by(step).collect();
         let map = VelocityMap {
@@ -95,7 +95,7 @@ impl<'p> Retrieval<'p> {
 
     /// The bound on the circulation, m^2/s; the pair where it is in the middle of the scan.
     fn bound_m2_s(&self) -> Result<f64, crate::Error> {
-        let (scene, g) = (&self.plan.scene.content, &self.plan.geometry);
+        let (scene, g) = (self.plan.scene(), &self.plan.geometry);
         let time_s = 0.5 * (self.plan.wind.start_s + self.plan.scan_end_s());
         let centres = vortex_pair(&self.pair).centres(time_s);
         let vortex = |lateral_position_m: f64| Vortex {

@@ -8,7 +8,7 @@ use crate::measure::bound::bound_in_the_middle;
 use crate::measure::cell_average::{CellAverage, error_of_fraction, flagged_fraction};
 use crate::measure::error_law::shared_cells;
 use crate::measure::map::{self, VelocityEstimates};
-use crate::measure::profile::Efficiencies;
+use crate::measure::profile::EfficiencyMemo;
 use crate::measure::ray_information::range_filter;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
@@ -56,7 +56,7 @@ struct Collected<'p> {
 /// What the crates refuse; a checked scene gives none.
 pub(super) fn rows(
     plans: &[Plan],
-    known: &Efficiencies,
+    known: &EfficiencyMemo,
     observer: &dyn Observer,
     fits: bool,
 ) -> Result<Vec<Vec<f64>>, Error> {
@@ -92,7 +92,7 @@ pub(super) fn rows(
 
 impl<'p> Collected<'p> {
     fn new(plan: &'p Plan, retrieval: Option<Retrieval<'p>>) -> Result<Self, Error> {
-        let scene = &plan.scene.content;
+        let scene = plan.scene();
         let g = &plan.geometry;
         let distance =
             Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
@@ -157,7 +157,7 @@ impl<'p> Collected<'p> {
 
     fn row(&self, map: &VelocityEstimates, scanner: &Scanner<'_>) -> Result<Vec<f64>, Error> {
         let plan = self.plan;
-        let scene = &self.plan.scene.content;
+        let scene = self.plan.scene();
         let middle =
             ScanMiddle::of(plan, None, Some(scanner)).ok_or(wakescope_estimate::Error::Empty {
                 field: "layers of a line",
@@ -203,7 +203,7 @@ impl<'p> Collected<'p> {
 /// Part of the estimates that say nothing of the air, and its standard error: those farther from it than any part of a peak, and
 /// as many of the others as a level floor over the band has there.
 fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let pulse = &plan.instrument.pulse;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let moment = |power: i32| {

@@ -8,7 +8,7 @@ use super::stored::{Definition, case_files};
 use super::tables;
 use crate::io::{Existing, OutputError, Table};
 use crate::measure::map::{self, VelocityEstimates};
-use crate::measure::profile::Efficiencies;
+use crate::measure::profile::EfficiencyMemo;
 use crate::measure::scan::Scanner;
 use crate::memo::Memo;
 use crate::plan::wind::SceneWind;
@@ -20,7 +20,6 @@ use crate::{Error, machine, outputs};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use wakescope_optics::plan::Plan as ScreenPlan;
 
 /// Part of the memory that is available which cases that are measured together may take.
 const SHARE: f64 = 0.5;
@@ -241,8 +240,7 @@ pub fn maps(
 #[derive(Debug, Default)]
 pub(crate) struct Common {
     winds: Memo<SceneWind>,
-    screens: Memo<Vec<ScreenPlan>>,
-    pub(crate) efficiencies: Efficiencies,
+    pub(crate) efficiencies: EfficiencyMemo,
 }
 
 impl Common {
@@ -259,8 +257,8 @@ impl Common {
                 scene.folder()
             )
         ));
-        let wind = self.winds.of(cause, || SceneWind::new(scene))?;
-        Plan::sharing(scene.clone(), target, wind, &self.screens)
+        let wind = self.winds.get_or_make(cause, || SceneWind::new(scene))?;
+        Plan::sharing(scene.clone(), target, wind, &self.efficiencies)
     }
 }
 
@@ -271,7 +269,7 @@ fn check(sweep: &Sweep, common: &Common, allow_large: bool) -> Result<Vec<f64>, 
         if !allow_large {
             plan.fits()?;
         }
-        Ok(plan.core_s)
+        Ok(plan.core_s())
     };
     let found: Vec<_> = sweep.cases.par_iter().map(checked).collect();
     let others = found

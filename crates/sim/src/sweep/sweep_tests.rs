@@ -296,7 +296,7 @@ fn maps_of_scenes_together_are_those_of_each_alone() {
     let scenes = [SMALL, &other, &narrow, &windy, &few, &moving, &moving_few].map(scene);
     let together = maps(&scenes, &crate::Silent).unwrap();
     for (scene, (plan, map)) in scenes.iter().zip(&together) {
-        assert_eq!(plan.scene.content, scene.content);
+        assert_eq!(plan.scene(), &scene.content);
         let alone = crate::plan::Plan::new(scene.clone(), crate::plan::Target::Map).unwrap();
         let alone = crate::run(&alone, &crate::Silent).unwrap().map.unwrap();
         let bits = |of: &crate::measure::map::VelocityEstimates| {

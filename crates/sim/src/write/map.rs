@@ -14,7 +14,7 @@ const JUDGES: &str = "velocity_standard_deviation rms standard_error level n_eff
 
 /// The map of a run in the form that files and pictures take.
 pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let g = &plan.geometry;
     let mount = &g.schedule.mount;
     let lines = &g.schedule.lines;

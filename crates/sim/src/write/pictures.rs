@@ -43,7 +43,7 @@ pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
         efficiency = efficiency.with(curve(&label, style, other));
     }
     let mut snr = Series::new("", Style::Line, points(&profile.snr_db));
-    let is_fixed = matches!(plan.scene.content.detector.snr, SnrReference::Fixed { .. });
+    let is_fixed = matches!(plan.scene().detector.snr, SnrReference::Fixed { .. });
     if has_error(e) && !is_fixed {
         snr.band = Some(snr_band_db(profile));
     }
@@ -105,7 +105,7 @@ pub(super) fn map(
         }
         Ok(plot)
     };
-    let realisations = plan.scene.content.scan.realisations;
+    let realisations = plan.scene().scan.realisations;
     let exact = panel("v_exact", "exact field")?;
     let colours = exact.colours;
     let scan = panel("v_scan", "one scan, estimated")?.coloured(colours);
@@ -296,17 +296,14 @@ pub(super) fn scan(plan: &Plan) -> Figure {
 /// What is shown, of which age and from how many realisations.
 fn title(plan: &Plan, has_gaps: bool) -> String {
     let mut words = vec!["Radial velocity [m/s], positive away from the lidar".to_owned()];
-    if matches!(
-        plan.scene.content.flow,
-        Flow::VortexPair(_) | Flow::Simulated(_)
-    ) {
+    if matches!(plan.scene().flow, Flow::VortexPair(_) | Flow::Simulated(_)) {
         let scan_s = plan.scan_end_s() - plan.wind.start_s;
         words.push(format!(
             "age τ = {:.2} at the start of the scan, which takes {scan_s:.2} s",
             plan.wind.tau
         ));
     }
-    words.push(match plan.scene.content.scan.realisations {
+    words.push(match plan.scene().scan.realisations {
         1 => "one realisation".into(),
         n => format!("{n} realisations"),
     });
@@ -318,7 +315,7 @@ fn title(plan: &Plan, has_gaps: bool) -> String {
 
 /// Centres of the vortices that the picture marks, where they are known.
 fn centres_m(plan: &Plan) -> Vec<(f64, f64)> {
-    match &plan.scene.content.flow {
+    match &plan.scene().flow {
         Flow::VortexPair(pair) => {
             let c = crate::plan::wind::vortex_pair(pair).centres(plan.wind.start_s);
             vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]

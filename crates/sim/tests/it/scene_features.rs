@@ -354,7 +354,7 @@ fn by_default_noise_passes_one_time_in_a_hundred_and_estimates_at_minus_14_db_ar
 /// A statistic is quadratic in the samples, so its mean is the sum of those of sinusoids with the powers that signal and noise have at
 /// their frequencies.
 fn shown_db<S: Sample>(plan: &Plan, velocity_m_s: f64, sinusoid: fn(f64, f64) -> S) -> [f64; 2] {
-    let (scene, instrument) = (&plan.scene.content, &plan.instrument);
+    let (scene, instrument) = (plan.scene(), &plan.instrument);
     let tools = Toolkit::<S>::new(scene, instrument, 1.0).unwrap();
     let sampling = estimators::sampling(scene).unwrap();
     let (d, n) = (&scene.detector, scene.estimator.window_samples);

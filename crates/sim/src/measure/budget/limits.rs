@@ -30,7 +30,7 @@ impl Limits {
     /// # Errors
     /// What estimators and signals refuse; a checked scene gives none.
     pub fn new(plan: &Plan) -> Result<Self, Error> {
-        let (scene, instrument) = (&plan.scene.content, &plan.instrument);
+        let (scene, instrument) = (plan.scene(), &plan.instrument);
         let (receiver, pulse, d) = (&instrument.receiver, &instrument.pulse, &scene.detector);
         let mut found = Self {
             values: Vec::new(),
@@ -106,11 +106,11 @@ impl Limits {
 
     fn velocities(&mut self, plan: &Plan) {
         let (d, half_m) = (
-            &plan.scene.content.detector,
-            0.5 * plan.scene.content.laser.wavelength_m,
+            &plan.scene().detector,
+            0.5 * plan.scene().laser.wavelength_m,
         );
         let band_m_s = 0.5 * half_m * d.bandwidth_hz;
-        let (low_m_s, high_m_s) = sampled_velocities_m_s(&plan.scene.content);
+        let (low_m_s, high_m_s) = sampled_velocities_m_s(plan.scene());
         let flow_m_s = plan.fastest_m_s;
         self.values.extend([
             ("band_m_s", band_m_s),
@@ -123,7 +123,7 @@ impl Limits {
     }
 
     fn phase_noise(&mut self, plan: &Plan) -> Result<(), Error> {
-        let scene = &plan.scene.content;
+        let scene = plan.scene();
         let (wavelength_m, linewidth_hz) = (scene.laser.wavelength_m, scene.laser.linewidth_hz);
         let window_s = scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
         let delay_s = 2.0 * scene.scan.range_min_m / SPEED_OF_LIGHT_M_S;
@@ -146,7 +146,7 @@ impl Limits {
     }
 
     fn resolution(&mut self, plan: &Plan) -> Result<(), Error> {
-        let scene = &plan.scene.content;
+        let scene = plan.scene();
         let gate_m = range_filter(plan)?.full_width_half_maximum_m();
         let pulse = RangeFilter::pulse(&plan.instrument.pulse, plan.geometry.layer_thickness_m)?;
         let pulse_m = pulse.full_width_half_maximum_m();

@@ -11,7 +11,7 @@ pub use limits::Limits;
 use crate::Error;
 use crate::io::Table;
 use crate::measure::efficiency_model::turbulence;
-use crate::measure::profile::{Efficiencies, LineOptics, efficiency_by_theory, free_space};
+use crate::measure::profile::{EfficiencyMemo, LineOptics, efficiency_by_theory, free_space};
 use crate::plan::Plan;
 use crate::plan::instrument::Instrument;
 use crate::progress::Observer;
@@ -67,7 +67,7 @@ impl Budget {
     pub fn new(plan: &Plan, range_m: &[f64], observer: &dyn Observer) -> Result<Self, Error> {
         let optics = LineOptics {
             plan,
-            known: &Efficiencies::default(),
+            known: &EfficiencyMemo::default(),
             observer,
         };
         let mut rows = Rows::new(plan, range_m, |sorted_m| optics.efficiency_at(sorted_m))?;
@@ -172,7 +172,7 @@ impl<'a> Rows<'a> {
             range_m,
             rows: Vec::new(),
         };
-        match plan.scene.content.detector.snr {
+        match plan.scene().detector.snr {
             SnrReference::Fixed { snr_db } => {
                 rows.same("stated by the scene", "", "detector.snr".into(), snr_db)
             }
@@ -188,7 +188,7 @@ impl<'a> Rows<'a> {
 
     /// The ratio in the width of the pulse, and the echo of the pulse before.
     fn beside_the_ratio(&mut self) -> Result<(), Error> {
-        let (scene, instrument) = (&self.plan.scene.content, &self.plan.instrument);
+        let (scene, instrument) = (self.plan.scene(), &self.plan.instrument);
         let width_hz = instrument.pulse.spectral_full_width_half_maximum_hz();
         let gain_db = decibels(scene.detector.bandwidth_hz / width_hz);
         let fwhm_s = instrument.gaussian_fwhm_s();
@@ -265,7 +265,7 @@ impl<'a> Rows<'a> {
 
     /// From the photons of the pulse to the electrons that it gives.
     fn transmitter_and_path(&mut self, efficiency: &EfficiencyProfile) -> Result<(), Error> {
-        let (scene, instrument) = (&self.plan.scene.content, &self.plan.instrument);
+        let (scene, instrument) = (self.plan.scene(), &self.plan.instrument);
         let (telescope, receiver, t) = (
             &instrument.telescope,
             &instrument.receiver,
@@ -381,7 +381,7 @@ impl<'a> Rows<'a> {
 
     /// What the receiver loses against the shot-noise limit.
     fn receiver(&mut self) {
-        let (scene, instrument) = (&self.plan.scene.content, &self.plan.instrument);
+        let (scene, instrument) = (self.plan.scene(), &self.plan.instrument);
         let (receiver, front) = (
             &instrument.receiver,
             scene.detector.front_end.unwrap_or_default(),

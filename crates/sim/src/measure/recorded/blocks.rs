@@ -145,7 +145,7 @@ impl<S: Sample> Blocks<'_, S> {
         let (plan, estimator, (read, held), lines) =
             (self.plan, &self.estimator, &tile.windows, &cells.lines);
         let of_records = lines.records(read);
-        let of_samples = estimators::gates(&plan.scene.content)?.samples(held);
+        let of_samples = estimators::gates(plan.scene())?.samples(held);
         let places = places_of(plan, &lines.record_elevation_rad(read))?;
         let mut sums = estimator
             .sums(places, Some(held.clone()))?

@@ -108,7 +108,7 @@ pub(super) fn scans(
     table: Option<&RayTable>,
 ) -> Result<Vec<ScanLines>, Error> {
     let count = records.records;
-    let per_line = plan.scene.content.scan.pulses_per_line;
+    let per_line = plan.scene().scan.pulses_per_line;
     let (elevation_rad, time_s) = match table {
         Some(table) => interpolate(table, count, per_line)?,
         None => match &records.about.elevation_rad {
@@ -116,7 +116,7 @@ pub(super) fn scans(
             None => (of_scene(plan, records)?, records.about.time_s.clone()),
         },
     };
-    let prt_s = 1.0 / plan.scene.content.laser.pulse_repetition_hz;
+    let prt_s = 1.0 / plan.scene().laser.pulse_repetition_hz;
     let time_s = time_s.unwrap_or_else(|| {
         (0..count)
             .map(|i| plan.wind.start_s + i as f64 * prt_s)
@@ -250,7 +250,7 @@ fn interpolate(
 /// Angles as the scene has them.
 fn of_scene(plan: &Plan, records: &RawRecords) -> Result<Vec<f64>, Error> {
     let (count, lines) = (records.records, &plan.geometry.elevation_rad);
-    let per_line = plan.scene.content.scan.pulses_per_line;
+    let per_line = plan.scene().scan.pulses_per_line;
     let whole = lines.len() * per_line;
     if !count.is_multiple_of(whole) {
         return Err(records.refuse(format!(

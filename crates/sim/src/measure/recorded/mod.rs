@@ -23,9 +23,9 @@ use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::measure::map::{self, AddRecords, VelocityEstimates};
 use crate::measure::scan::Scanner;
-use crate::measure::sizes::records_at_once;
+use crate::measure::scan::records_at_once;
 use crate::plan::scan_lines;
-use crate::plan::{Plan, Stage, Target};
+use crate::plan::{Plan, Stage};
 use crate::progress::Observer;
 use crate::scene::{DetectorSignal, Digitiser, Estimator, Outputs, Scene, SceneFile, Site};
 use num_complex::Complex;
@@ -91,18 +91,18 @@ pub fn open(path: &Path, format: &RawFormat, scene: &Scene) -> Result<RawRecords
     )
 }
 
-/// The plan for the records of a file: that of the scene with as many repetitions as the file has, its receiver mirrored where the
-/// spectrum of the records is reversed, and whether the truth of the scene is that of the records. The observer is warned of keys
-/// of the file's scene that are skipped.
+/// The scene for the records of a file: with as many repetitions as the file has, its receiver mirrored where the spectrum of the
+/// records is reversed; and whether the truth of the scene is that of the records. The observer is warned of keys of the file's
+/// scene that are skipped.
 ///
 /// # Errors
-/// As [`Plan::new`]; records of another shape or kind than the scene's, recorded otherwise than it says; signals of the same
-/// scene that were drawn with another seed, or of another number of realisations.
-pub fn plan(
+/// Fails if the records have another shape or kind than the scene's or were recorded with other keys, or if they are signals of the
+/// same scene that were drawn with another seed or number of realisations.
+pub fn scene_of_records(
     scene: SceneFile,
     records: &RawRecords,
     observer: &dyn Observer,
-) -> Result<(Plan, bool), Error> {
+) -> Result<(SceneFile, bool), Error> {
     fits(&scene.content, records)?;
     let scene = if records.is_reversed {
         mirrored(scene)?
@@ -143,7 +143,7 @@ pub fn plan(
         own.scan.realisations = repetitions;
         scene.with(own)?
     };
-    Ok((Plan::new(file, Target::Map)?, is_own))
+    Ok((file, is_own))
 }
 
 /// The scene whose receiver records signals with the reversed spectrum: the intermediate frequency of
@@ -238,7 +238,7 @@ pub fn estimate(
     options: &RecordedOptions,
     observer: &dyn Observer,
 ) -> Result<Recorded, Error> {
-    match plan.scene.content.detector.signal {
+    match plan.scene().detector.signal {
         DetectorSignal::IntermediateFrequency => {
             of_samples::<f64>(plan, is_own, records, options, observer)
         }
@@ -246,7 +246,7 @@ pub fn estimate(
             of_samples::<Complex<f64>>(plan, is_own, records, options, observer)
         }
     }
-    .map_err(|error| plan.scene.of_key(error))
+    .map_err(|error| plan.file.of_key(error))
 }
 
 fn of_samples<S: Sample>(
@@ -272,7 +272,7 @@ fn of_samples<S: Sample>(
         });
     }
     if !plan.geometry.schedule.keeps_to_a_plane() {
-        let kind = plan.scene.content.scan.pattern.name();
+        let kind = plan.scene().scan.pattern.name();
         return Err(records.refuse(format!(
             "the lines of the scene (scan.pattern.kind = \"{kind}\") are not those of one vertical plane from a lidar and a head that \
              stand still: such records are estimated where they are a simulation's own, by its scene, without --rays and --spectra; \
@@ -420,7 +420,7 @@ fn largest_part(
     if largest == 0.0 {
         return Err(records.refuse("all of its samples are 0".into()));
     }
-    if let Digitiser::Quantised { bits, .. } = plan.scene.content.detector.digitiser
+    if let Digitiser::Quantised { bits, .. } = plan.scene().detector.digitiser
         && records.are_integers
         && largest / records.whole_scale() > (f64::from(bits) - 1.0).exp2()
     {

@@ -30,7 +30,7 @@ pub(super) struct PredictedError {
 impl PredictedError {
     /// For regions of a scan of a scene that have at most the radius `largest_m`.
     pub(super) fn new(plan: &Plan, places: ScanGeometry, largest_m: f64) -> Result<Self, Error> {
-        let is_noisy = plan.scene.content.detector.noise != NoiseModel::None;
+        let is_noisy = plan.scene().detector.noise != NoiseModel::None;
         let (of_rays, count) = (
             RayInformation::new(plan, &[])?,
             places.most_gates(largest_m),
@@ -42,7 +42,7 @@ impl PredictedError {
             .iter()
             .map(|db| of_snr(*db))
             .collect::<Result<_, Error>>()?;
-        let bias = ExpectedBias::new(&plan.scene.content, &plan.instrument)?;
+        let bias = ExpectedBias::new(plan.scene(), &plan.instrument)?;
         Ok(Self {
             bias,
             places,
@@ -95,7 +95,7 @@ impl PredictedError {
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub fn predicted_table(plan: &Plan, map: &VelocityEstimates) -> Result<Table, Error> {
-    let places = places(&plan.scene.content, &plan.geometry)?;
+    let places = places(plan.scene(), &plan.geometry)?;
     let points = polar_points(places.line_elevation_rad(), &map.range_m);
     let largest_m = map.radius_m.iter().copied().fold(0.0, f64::max);
     let predicted = PredictedError::new(plan, places, largest_m)?;
@@ -167,7 +167,7 @@ mod tests {
         ] {
             let plan = plan(detector, method);
             let map = run(&plan, &Silent).unwrap().map.unwrap();
-            let places = places(&plan.scene.content, &plan.geometry).unwrap();
+            let places = places(plan.scene(), &plan.geometry).unwrap();
             let predicted = PredictedError::new(&plan, places, 3.0).unwrap();
             let count = map.bias_m_s.len() as f64;
             let (mut found_m_s, mut stated_m_s) = (0.0, 0.0);
@@ -190,7 +190,7 @@ mod tests {
         for estimator in ["", "window_samples = 16\n"] {
             let plan = plan("", estimator);
             let found = bound(&plan, &Silent).unwrap().by_range[3];
-            let places = places(&plan.scene.content, &plan.geometry).unwrap();
+            let places = places(plan.scene(), &plan.geometry).unwrap();
             let elevation_rad = places.line_elevation_rad()[2];
             let predicted = PredictedError::new(&plan, places, 3.0).unwrap();
             let point = PolarPoint {

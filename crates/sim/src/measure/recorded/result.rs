@@ -141,7 +141,7 @@ fn quietest(plan: &Plan, scan: &ScanCells) -> f64 {
 /// The map of the scans, each a sweep, in the form that files and pictures take.
 pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, Error> {
     type Of = fn(&MeasuredScan) -> &Array2<f64>;
-    let scene = &plan.scene.content;
+    let scene = plan.scene();
     let (azimuth_rad, pulses) = (scene.scan.azimuth_rad, scene.scan.pulses_per_line as u32);
     let of_scan = |(sweep, scan): (usize, &MeasuredScan)| -> Vec<Ray> {
         let rays = scan.lines.elevation_rad.iter().zip(&scan.lines.time_s);

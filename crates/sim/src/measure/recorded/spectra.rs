@@ -32,7 +32,7 @@ pub struct Spectra {
 impl Spectra {
     /// Of the lines and the densities of each scan.
     pub(super) fn of(plan: &Plan, scans: &[(&ScanLines, &[f32])]) -> Result<Self, Error> {
-        let of_gate = GateSpectra::new(plan, estimators::signal_kind(&plan.scene.content))?;
+        let of_gate = GateSpectra::new(plan, estimators::signal_kind(plan.scene()))?;
         let lines = || scans.iter().map(|(lines, _)| lines);
         let elevation_rad = lines()
             .flat_map(|lines| lines.elevation_rad.iter().copied())
@@ -103,7 +103,7 @@ impl GateSpectra {
     /// # Errors
     /// A method whose numbers are no correlogram of the whole window.
     pub(super) fn new(plan: &Plan, kind: SignalKind) -> Result<Self, Error> {
-        let scene = &plan.scene.content;
+        let scene = plan.scene();
         // Models of windows without weighting take the first lags alone.
         let e = &scene.estimator;
         if e.few_lags().is_some() {

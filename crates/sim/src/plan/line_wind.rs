@@ -4,13 +4,13 @@
 
 use crate::Error;
 use crate::beams::Beam;
-use crate::plan::Setup;
+use crate::plan::Plan;
 use crate::plan::geometry::Geometry;
 use crate::scene::{Outside, WindOfPulses};
 use wakescope_signal::RangeFilter;
 
 /// The air of the layers along a beam.
-pub(crate) struct Air {
+pub(crate) struct LineWind {
     /// Radial velocity, m/s; NaN where nothing returns light.
     pub(crate) radial_velocity_m_s: Vec<f64>,
     /// Of a line whose pulses have airs of their own, the standard deviation of what they see at the gates through the filter of the
@@ -22,7 +22,7 @@ pub(crate) struct Air {
 ///
 /// # Errors
 /// What the filter refuses; a checked scene gives none.
-pub(crate) fn seen_m_s(
+pub(crate) fn weighted_at_gates_m_s(
     filter: &RangeFilter,
     g: &Geometry,
     velocity_m_s: &[f64],
@@ -38,25 +38,25 @@ pub(crate) fn seen_m_s(
 }
 
 /// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have airs of their own.
-pub(crate) fn air_of_line(
-    setup: &Setup,
+pub(crate) fn wind_of_line(
+    plan: &Plan,
     filter: &RangeFilter,
     range_m: &[f64],
     line: usize,
-) -> Result<Air, Error> {
-    let g = &setup.geometry;
+) -> Result<LineWind, Error> {
+    let g = &plan.geometry;
     let schedule = &g.schedule;
     let pulses = schedule.lines[line].pulses;
-    if setup.scene.content.scan.wind_of_pulses == WindOfPulses::default() {
-        return air_along(setup, &schedule.middle(line), range_m);
+    if plan.scene().scan.wind_of_pulses == WindOfPulses::default() {
+        return wind_along(plan, &schedule.middle(line), range_m);
     }
     let mut sums_m_s = vec![0.0; range_m.len()];
     let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
     let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
     let share = 1.0 / pulses as f64;
     for pulse in 0..pulses {
-        let here = air_along(setup, &schedule.beam(line, pulse as f64), range_m)?;
-        let here_seen_m_s = seen_m_s(filter, g, &here.radial_velocity_m_s)?;
+        let here = wind_along(plan, &schedule.beam(line, pulse as f64), range_m)?;
+        let here_seen_m_s = weighted_at_gates_m_s(filter, g, &here.radial_velocity_m_s)?;
         // About the first air, so that the mean of equal airs is that air.
         if pulse == 0 {
             (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), here_seen_m_s.clone());
@@ -81,7 +81,7 @@ pub(crate) fn air_of_line(
     }
     let spread = |(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt();
     let spread_m_s = Some(sums.into_iter().map(spread).collect());
-    Ok(Air {
+    Ok(LineWind {
         radial_velocity_m_s: sums_m_s,
         spread_m_s,
     })
@@ -90,25 +90,25 @@ pub(crate) fn air_of_line(
 /// Radial velocity, m/s, positive away from the lidar, at ranges along the middle of line of sight `line`; NaN where nothing
 /// returns light: below the ground or outside the flow, if the scene masks that.
 pub(crate) fn radial_velocity_m_s(
-    setup: &Setup,
+    plan: &Plan,
     line: usize,
     range_m: &[f64],
 ) -> Result<Vec<f64>, Error> {
-    velocity_along(setup, &setup.geometry.schedule.middle(line), range_m)
+    velocity_along(plan, &plan.geometry.schedule.middle(line), range_m)
 }
 
 /// The air along a beam.
-pub(crate) fn air_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Air, Error> {
-    Ok(Air {
-        radial_velocity_m_s: velocity_along(setup, beam, range_m)?,
+pub(crate) fn wind_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<LineWind, Error> {
+    Ok(LineWind {
+        radial_velocity_m_s: velocity_along(plan, beam, range_m)?,
         spread_m_s: None,
     })
 }
 
 /// [`known_velocity_m_s`] with what the scene says of places where the flow is not known.
-fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Vec<f64>, Error> {
-    let (points_m, known_m_s) = known_velocity_m_s(setup, beam, range_m)?;
-    let scan = &setup.scene.content.scan;
+fn velocity_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+    let (points_m, known_m_s) = known_velocity_m_s(plan, beam, range_m)?;
+    let scan = &plan.scene().scan;
     let elevation_rad = beam.elevation_rad;
     let checked = |((&[x_m, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
         let outside = match (z_m < 0.0, known_m_s.is_nan()) {
@@ -141,7 +141,7 @@ type Along = (Vec<[f64; 3]>, Vec<f64>);
 
 /// The radial velocity of the flow along a beam; NaN where it is not known.
 pub(crate) fn known_velocity_m_s(
-    setup: &Setup,
+    plan: &Plan,
     beam: &Beam,
     range_m: &[f64],
 ) -> Result<Along, Error> {
@@ -150,9 +150,9 @@ pub(crate) fn known_velocity_m_s(
         .map(|range_m| beam.at_range_m(*range_m))
         .collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    setup.wind.wind().velocity_into(
+    plan.wind.wind().velocity_into(
         &points_m,
-        setup.wind.start_s + beam.time_s,
+        plan.wind.start_s + beam.time_s,
         &mut velocity_m_s,
     )?;
     let along = velocity_m_s

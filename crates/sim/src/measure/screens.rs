@@ -1,223 +1,134 @@
-//! The optics of a plan: phase screens only where no theory is valid, or where they are asked for beside it.
+//! The stage of the phase screens: only where no theory is valid, or where they are requested beside
+//! it.
 
-use super::stage::{PlannedStage, Target, run, skip};
 use crate::Error;
-use crate::interpolation::linspace;
 use crate::measure::efficiency_model::{
-    MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, stretches,
-    turbulence,
+    OF_SCREENS, model, signals_cross_screens, stretches, turbulence,
 };
-use crate::memo::Memo;
-use crate::plan::Setup;
-use crate::progress::Stage;
-use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
+use crate::measure::profile::{EfficiencyMemo, layer_ranges_m, table_ranges_m};
+use crate::plan::{Plan, PlannedStage, Stage};
+use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling};
 use std::sync::Arc;
+use wakescope_optics::curved_ranges_m;
 use wakescope_optics::plan::Plan as ScreenPlan;
-use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
-use wakescope_optics::{Focus, Telescope, curved_ranges_m, theory};
+use wakescope_optics::plan::{LayerGap, Limit, Model, SetUp, Violation, Warning};
 
-/// Plans of the phase screens of all stretches of range.
-pub(crate) type ScreenPlans = Arc<Vec<ScreenPlan>>;
-
-/// Phase screens and efficiency, their time on one core, s, and the plans of the screens; adds what is doubtful about the screens to
-/// `warnings`.
+/// The stage of the phase screens, and the plans of the screens of all stretches of range.
 ///
 /// # Errors
-/// Screens that cannot resolve the scene, with every limit and what would do; a beam that no quadrature follows.
-pub(super) fn stages(
-    setup: &Setup,
-    target: Target,
-    planned: &Memo<Vec<ScreenPlan>>,
-    warnings: &mut Vec<String>,
-) -> Result<([PlannedStage; 2], f64, ScreenPlans), Error> {
-    let Setup {
-        scene: file,
-        instrument,
-        geometry,
-        ..
-    } = setup;
-    let scene = &file.content;
-    let fixed = if let SnrReference::Fixed { snr_db } = scene.detector.snr {
-        Some(snr_db)
-    } else {
-        None
+/// Fails if screens cannot resolve the scene, with every limit and what would do.
+pub(crate) fn planned(
+    plan: &Plan,
+    memo: &EfficiencyMemo,
+) -> Result<(PlannedStage, Arc<Vec<ScreenPlan>>), Error> {
+    let skipped = |why: &str| {
+        let stage = PlannedStage::skipped(Stage::PhaseScreens, why);
+        Ok((stage, Arc::default()))
     };
-    let o = &scene.outputs;
-    let model = model(scene);
-    // Ranges at which the efficiency is wanted: for the table, and for the layers of the signals.
-    let table = matches!(target, Target::Run | Target::Efficiency).then(|| {
-        linspace(
-            o.profile_range_min_m,
-            o.profile_range_max_m,
-            o.profile_points,
-        )
-    });
-    let telescope = &instrument.telescope;
-    let layers = (target != Target::Efficiency && fixed.is_none()).then(|| {
-        let first_m = geometry.first_layer_range_m;
-        let last_m = first_m + geometry.layers as f64 * geometry.layer_thickness_m;
-        curved_ranges_m(telescope, first_m, last_m, OF_QUADRATURES)
-    });
-    let ranges_m: Vec<f64> = table.iter().chain(&layers).flatten().copied().collect();
-    refuse_fresnel_numbers(telescope, &ranges_m)?;
-    // A table through turbulence has the free-space and the exact bistatic curves beside the Monte Carlo.
-    let places = if turbulence(scene).is_some() { 16 } else { 0 };
-    let quadratures_s: f64 = ranges_m
-        .iter()
-        .map(|&r| theory::quadrature_cost_s(telescope, places, r))
-        .sum();
-    // Of more ranges than this a curve is made.
-    let quadratures_s =
-        quadratures_s * (MOST_QUADRATURES as f64 / ranges_m.len().max(1) as f64).min(1.0);
-    let skipped = |why| (skip(Stage::PhaseScreens, why), 0.0, Arc::default());
-    let (screens, screens_s, plans) = match turbulence(scene) {
-        None => skipped("no turbulence: atmosphere.turbulence"),
-        Some(t) => {
-            let drawn = layers.filter(|_| signals_cross_screens(scene));
-            let mut across: Vec<f64> = table.iter().chain(&drawn).flatten().copied().collect();
-            across.sort_by(f64::total_cmp);
-            let of_stretch = |([from_m, to_m], _): ([f64; 2], &[f64])| {
-                curved_ranges_m(telescope, from_m, to_m, OF_SCREENS)
-            };
-            let runs: Vec<Vec<f64>> = stretches(scene, geometry, &across)
-                .into_iter()
-                .map(of_stretch)
-                .collect();
-            match (runs.is_empty(), model) {
-                (false, _) => screens(setup, &t, &runs, planned, warnings)?,
-                (true, Model::ExactBistatic) => {
-                    skipped("the bistatic efficiency has an exact theory")
-                }
-                (true, _) => skipped("not asked for"),
-            }
-        }
+    let Some(t) = turbulence(plan.scene()) else {
+        return skipped("no turbulence: atmosphere.turbulence");
     };
-    let efficiency = match fixed {
-        Some(snr_db) if ranges_m.is_empty() => skip(
-            Stage::Efficiency,
-            &format!("detector.snr fixes {snr_db} dB at every range"),
-        ),
-        _ => {
-            let how = match model {
-                Model::FreeSpace => "free space, by quadrature",
-                Model::ExactBistatic => "independent paths, exact by quadrature",
-                Model::MonteCarlo => "one path out and back, by phase screens",
-            };
-            // Mean, scatter and error of each model.
-            let models = if turbulence(scene).is_some() {
-                5.0
-            } else {
-                1.0
-            };
-            let kept_bytes = ranges_m.len() as f64 * (16.0 + 24.0 * models);
-            let reason = format!("{how}, at {} ranges", ranges_m.len());
-            run(Stage::Efficiency, reason, [0.0, kept_bytes])
-        }
-    };
-    Ok(([screens, efficiency], quadratures_s + screens_s, plans))
-}
-
-/// Refuses a beam whose Fresnel number is too large for the quadratures, in the words of the scene.
-fn refuse_fresnel_numbers(telescope: &Telescope, ranges_m: &[f64]) -> Result<(), Error> {
-    let worst = ranges_m
-        .iter()
-        .map(|&r| (theory::fresnel_number(telescope, r), r))
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((found, range_m)) = worst.filter(|(n, _)| *n > theory::LARGEST_FRESNEL_NUMBER) else {
-        return Ok(());
-    };
-    let most = theory::LARGEST_FRESNEL_NUMBER;
-    let excess = format!(
-        "a Fresnel number a^2 |1/R - 1/F| / lambda of at most {most}, for which the efficiency has a quadrature; it is {found:.0} at \
-         {range_m} m"
-    );
-    // Without the focus the number would be this.
-    let rest = theory::fresnel_number(
-        &Telescope {
-            focus: Focus::Collimated,
-            ..*telescope
-        },
-        range_m,
-    );
-    Err(match telescope.focus {
-        Focus::At(focus_m) if rest < most => {
-            // |1/R - 1/F| <= limit from F = 1/(1/R + limit) upwards, of either sign.
-            let shortest_m = range_m * rest / (most + if focus_m > 0.0 { rest } else { -rest });
-            let sign = if focus_m > 0.0 { "from " } else { "to -" };
-            let reason = format!("{excess}: {sign}{:.2} m", 1.01 * shortest_m + 0.01);
-            Error::Key {
-                key: "telescope.focus_m",
-                reason,
-            }
-        }
-        _ => {
-            let largest_m = 0.99 * telescope.aperture_radius_m * (most / found).sqrt();
-            Error::Key {
-                key: "telescope.aperture_radius_m",
-                reason: format!("{excess}: to {largest_m:.4} m"),
-            }
-        }
-    })
-}
-
-/// The phase screens of all runs, each for its own ranges, their time, s, and their plans.
-fn screens(
-    setup: &Setup,
-    t: &RefractiveTurbulence,
-    runs: &[Vec<f64>],
-    planned: &Memo<Vec<ScreenPlan>>,
-    warnings: &mut Vec<String>,
-) -> Result<(PlannedStage, f64, ScreenPlans), Error> {
-    let (mut core_s, mut working_bytes) = (0.0, 0.0_f64);
-    let mut what = Vec::new();
-    let lists: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
-    let plan = || {
-        setup
-            .instrument
-            .screen_plans(t, &lists)
-            .map_err(|e| refused(&setup.scene, t, e))
-    };
-    let plans = planned.of(format!("{:?}", (setup.instrument.telescope, t, runs)), plan)?;
-    for (range_m, plan) in runs.iter().zip(plans.iter()) {
-        core_s += plan.realisation_cpu_s * t.realisations as f64;
-        let memory_bytes = plan.memory_bytes_of(t.realisations, rayon::current_num_threads());
+    let ranges_m = screen_ranges_m(plan);
+    if ranges_m.is_empty() {
+        return skipped(match model(plan.scene()) {
+            Model::ExactBistatic => "the bistatic efficiency has an exact theory",
+            _ => "not asked for",
+        });
+    }
+    let key = format!("{:?}", (plan.instrument.telescope, t, &ranges_m));
+    let screens = memo.screen_plans.get_or_make(key, || {
+        let runs: Vec<&[f64]> = ranges_m.iter().map(Vec::as_slice).collect();
+        let plans = plan.instrument.screen_plans(&t, &runs);
+        plans.map_err(|error| refused(&plan.file, &t, error))
+    })?;
+    let mut core_s = 0.0;
+    let mut working_bytes = 0.0_f64;
+    let mut descriptions = Vec::new();
+    for (range_m, screens) in ranges_m.iter().zip(screens.iter()) {
+        core_s += screens.realisation_cpu_s * t.realisations as f64;
+        let memory_bytes = screens.memory_bytes_of(t.realisations, rayon::current_num_threads());
         working_bytes = working_bytes.max(memory_bytes as f64);
+        descriptions.push(described(screens, range_m.last().copied().unwrap_or(0.0)));
+    }
+    let reason = format!(
+        "{} realisations of {}",
+        t.realisations,
+        descriptions.join("; ")
+    );
+    let remedy = match t.sampling {
+        ScreenSampling::Derived => "a smaller scan.range_max_m and outputs.profile_range_max_m",
+        ScreenSampling::Explicit => "fewer atmosphere.turbulence.grid_points",
+    };
+    let stage = PlannedStage::running(Stage::PhaseScreens, reason)
+        .with_memory(working_bytes, 0.0, remedy.into())
+        .with_time(core_s);
+    Ok((stage, screens))
+}
+
+/// What is doubtful about the phase screens of a plan, each warning once.
+pub(crate) fn warnings(plan: &Plan, screens: &[ScreenPlan]) -> Vec<String> {
+    let mut out = Vec::new();
+    let Some(t) = turbulence(plan.scene()) else {
+        return out;
+    };
+    for (range_m, screens) in screen_ranges_m(plan).iter().zip(screens) {
         let last_m = range_m.last().copied().unwrap_or(0.0);
-        let g = plan.grid;
-        let mut words = format!(
-            "{} screens to {last_m:.0} m of {} x {} points of {:.3} mm",
-            plan.layers.end_m().len(),
-            g.nx,
-            g.ny,
-            1e3 * g.dx_m
-        );
-        if let Some(worst) = plan
-            .gaps
-            .iter()
-            .max_by(|a, b| a.relative.abs().total_cmp(&b.relative.abs()))
-        {
-            // The layers' own error, known without random numbers, beside the one that the realisations leave.
-            words += &format!(
-                " (layers shift the mean by {:+.2} % at {:.0} m, where its error is {:.2} %)",
-                100.0 * worst.relative,
-                worst.range_m,
-                100.0 * worst.standard_error
-            );
-        }
-        what.push(words);
-        for words in plan.warnings.iter().map(|w| in_words(w, last_m, t)) {
+        for warning in &screens.warnings {
+            let text = warning_text(warning, last_m, &t);
             // That of the inner scale is the same for all.
-            if !warnings.contains(&words) {
-                warnings.push(words);
+            if !out.contains(&text) {
+                out.push(text);
             }
         }
     }
-    let reason = format!("{} realisations of {}", t.realisations, what.join("; "));
-    Ok((
-        run(Stage::PhaseScreens, reason, [working_bytes, 0.0]),
-        core_s,
-        plans,
-    ))
+    out
+}
+
+/// Ranges of each run of phase screens, m: one run for each stretch of range that has its own.
+fn screen_ranges_m(plan: &Plan) -> Vec<Vec<f64>> {
+    let mut across_m = table_ranges_m(plan);
+    if signals_cross_screens(plan.scene()) {
+        across_m.extend(layer_ranges_m(plan));
+    }
+    across_m.sort_by(f64::total_cmp);
+    let mut runs = Vec::new();
+    for ([from_m, to_m], _) in stretches(plan.scene(), &plan.geometry, &across_m) {
+        runs.push(curved_ranges_m(
+            &plan.instrument.telescope,
+            from_m,
+            to_m,
+            OF_SCREENS,
+        ));
+    }
+    runs
+}
+
+/// Screens of one run up to a range, m, in words.
+fn described(screens: &ScreenPlan, last_m: f64) -> String {
+    let g = screens.grid;
+    let mut text = format!(
+        "{} screens to {last_m:.0} m of {} x {} points of {:.3} mm",
+        screens.layers.end_m().len(),
+        g.nx,
+        g.ny,
+        1e3 * g.dx_m
+    );
+    if let Some(worst) = worst_gap(&screens.gaps) {
+        // The layers' own error, known without random numbers, beside that of the realisations.
+        text += &format!(
+            " (layers shift the mean by {:+.2} % at {:.0} m, where its error is {:.2} %)",
+            100.0 * worst.relative,
+            worst.range_m,
+            100.0 * worst.standard_error
+        );
+    }
+    text
+}
+
+/// The largest shift of the mean by the layers.
+fn worst_gap(gaps: &[LayerGap]) -> Option<&LayerGap> {
+    gaps.iter()
+        .max_by(|a, b| a.relative.abs().total_cmp(&b.relative.abs()))
 }
 
 /// A refusal of the optics in the keys of the scene; the strongest limit of each key is named.
@@ -339,7 +250,7 @@ fn more_layers(t: &RefractiveTurbulence, needed: Option<usize>) -> String {
     }
 }
 
-fn in_words(warning: &Warning, range_m: f64, t: &RefractiveTurbulence) -> String {
+fn warning_text(warning: &Warning, range_m: f64, t: &RefractiveTurbulence) -> String {
     match warning {
         Warning::InnerScale { missing } => format!(
             "the screens miss {:.1} % of the structure function at one grid spacing: atmosphere.turbulence.grid_spacing_m is \

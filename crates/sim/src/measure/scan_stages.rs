@@ -1,0 +1,180 @@
+//! The stages along the lines of sight: wind, signals and noise; what each needs.
+
+use crate::Error;
+use crate::measure::efficiency_model::drawn_turbulence;
+use crate::measure::scan::{WINDS_BYTES, records_at_once};
+use crate::plan::line_wind::radial_velocity_m_s;
+use crate::plan::{Plan, PlannedStage, Stage, Target};
+use crate::scene::{Flow, NoiseModel, Outside, WindOfPulses};
+
+/// The stage of the wind along the lines of sight.
+///
+/// # Errors
+/// Fails if a line leaves a simulated flow and the scene does not mask that.
+pub(crate) fn lines_of_sight(plan: &Plan) -> Result<PlannedStage, Error> {
+    if plan.target == Target::Efficiency {
+        return Ok(PlannedStage::skipped(Stage::LinesOfSight, "not asked for"));
+    }
+    refuse_lines_outside(plan)?;
+    let n = &plan.counts;
+    let g = &plan.geometry;
+    let reason = format!(
+        "{} lines of {} layers of {:.3} m",
+        n.lines, g.layers, g.layer_thickness_m
+    );
+    // Positions and velocities of the lines at work.
+    let working_bytes = wind_bytes(plan) + n.threads * n.layers * 64.0;
+    Ok(
+        PlannedStage::running(Stage::LinesOfSight, reason).with_memory(
+            working_bytes,
+            0.0,
+            fewer_layers(plan),
+        ),
+    )
+}
+
+/// The stage of the signals.
+pub(crate) fn signals(plan: &Plan) -> PlannedStage {
+    if plan.target == Target::Efficiency {
+        return PlannedStage::skipped(Stage::Signals, "not asked for");
+    }
+    let n = &plan.counts;
+    let scan = &plan.scene().scan;
+    let reason = format!(
+        "{} x {} records of {} samples, {} layers each",
+        n.realisations, n.records, plan.geometry.samples, plan.geometry.layers_per_sample
+    );
+    let kept_line_bytes = if n.kept > 0.0 {
+        n.lines * n.layers * 8.0
+    } else {
+        0.0
+    };
+    let kept_bytes = n.kept * n.records * n.samples * n.parts * 8.0 + kept_line_bytes;
+    // The echo of the previous pulse is made of lines of its own.
+    let second_trip_bytes = if scan.second_trip.is_some() {
+        16.0 * n.layers * n.lines
+    } else {
+        0.0
+    };
+    // Pulses with a wind of their own: a piece of winds.
+    let winds_bytes = if scan.wind_of_pulses == WindOfPulses::default() {
+        0.0
+    } else {
+        WINDS_BYTES
+    };
+    let working_bytes = scan_bytes(plan) + second_trip_bytes + winds_bytes;
+    PlannedStage::running(Stage::Signals, reason)
+        .with_memory(working_bytes, kept_bytes, fewer_layers(plan))
+        .with_time(signals_s(plan))
+}
+
+/// The stage of the noise.
+pub(crate) fn noise(plan: &Plan) -> PlannedStage {
+    if plan.target == Target::Efficiency {
+        return PlannedStage::skipped(Stage::Noise, "not asked for");
+    }
+    if plan.scene().detector.noise == NoiseModel::None {
+        return PlannedStage::skipped(Stage::Noise, "detector.noise is \"none\"");
+    }
+    let n = &plan.counts;
+    let values = n.realisations * n.records * n.samples * n.parts;
+    PlannedStage::running(Stage::Noise, format!("{values} samples")).with_memory(
+        0.0,
+        0.0,
+        fewer_layers(plan),
+    )
+}
+
+/// Keys that reduce the layers of all lines.
+fn fewer_layers(plan: &Plan) -> String {
+    plan.fewer_records_or(format!(
+        "{} or a smaller scan.range_max_m",
+        plan.fewer_lines()
+    ))
+}
+
+/// Memory that is held while signals are made, bytes: velocity and weight of each layer, and
+/// efficiencies where pulses have their own.
+pub(crate) fn wind_bytes(plan: &Plan) -> f64 {
+    let n = &plan.counts;
+    let drawn = drawn_turbulence(plan.scene()).map_or(0.0, |t| t.realisations as f64);
+    8.0 * n.layers * (2.0 * n.lines + drawn)
+}
+
+/// Memory that is held while signals are made, bytes: the winds, the plans of carrier and noise,
+/// for each thread the layers and the transforms of a record, and a piece of records.
+pub(crate) fn scan_bytes(plan: &Plan) -> f64 {
+    let n = &plan.counts;
+    let of_thread = n.layers * 48.0 + n.samples * 100.0;
+    let numbers = plan.geometry.samples * n.parts as usize;
+    let at_once = records_at_once::<f64>(numbers, n.records.min(1e15) as usize) as f64;
+    wind_bytes(plan)
+        + n.samples * 80.0
+        + n.threads * of_thread
+        + at_once * (n.samples * n.parts * 8.0 + 64.0)
+}
+
+/// Time of one record, s of one core.
+pub(crate) fn record_s(plan: &Plan) -> f64 {
+    let n = &plan.counts;
+    n.layers * 5.4e-8 + n.samples * (n.layers_per_sample * 1.2e-10 + 5e-8)
+}
+
+/// Time of the signals of all realisations and their winds, s of one core.
+fn signals_s(plan: &Plan) -> f64 {
+    let n = &plan.counts;
+    let scene = plan.scene();
+    let mut wind_s = wind_point_s(&scene.flow);
+    for flow in &scene.added_flows {
+        wind_s += wind_point_s(flow);
+    }
+    let winds_per_line = match scene.scan.wind_of_pulses {
+        WindOfPulses::Line {} => 1,
+        WindOfPulses::Pulse {} => scene.scan.pulses_per_line,
+    };
+    let winds = n.lines * winds_per_line as f64;
+    let kept_s = n.kept * n.records * n.samples * n.parts * 4e-8;
+    n.realisations * (n.records * record_s(plan) + winds * n.layers * wind_s) + kept_s
+}
+
+/// Time of the wind at one point, s of one core.
+fn wind_point_s(flow: &Flow) -> f64 {
+    match flow {
+        Flow::Simulated(_) | Flow::Fields(_) => 4e-7,
+        _ => 7e-8,
+    }
+}
+
+/// Largest number of layers of a line that are examined one by one.
+const LAYERS_EXAMINED: usize = 1_000_000;
+
+/// Refuses lines that leave a simulated flow, with the error of a run. The domain is convex, so
+/// both ends above the ground tell whether a line is inside; only failing lines are examined layer
+/// by layer.
+fn refuse_lines_outside(plan: &Plan) -> Result<(), Error> {
+    let g = &plan.geometry;
+    if !matches!(plan.scene().flow, Flow::Simulated(_) | Flow::Fields(_))
+        || plan.scene().scan.outside_flow != (Outside::Error {})
+    {
+        return Ok(());
+    }
+    let last_m = g.first_layer_range_m + g.layers.saturating_sub(1) as f64 * g.layer_thickness_m;
+    for line in 0..g.schedule.lines.len() {
+        // Where a line that points down meets the ground.
+        let beam = g.schedule.middle(line);
+        let sin = beam.direction.0[2];
+        let ground_m = if sin < 0.0 {
+            -beam.position_m[2] / sin
+        } else {
+            f64::INFINITY
+        };
+        let ends_m = [g.first_layer_range_m, last_m.min(ground_m)];
+        if g.first_layer_range_m <= ground_m && radial_velocity_m_s(plan, line, &ends_m).is_err() {
+            // The error of the run is that of the first layer outside.
+            let ranges_m: Vec<f64> = g.layer_range_m().take(LAYERS_EXAMINED).collect();
+            radial_velocity_m_s(plan, line, &ranges_m)?;
+            radial_velocity_m_s(plan, line, &ends_m)?;
+        }
+    }
+    Ok(())
+}
