@@ -93,18 +93,19 @@ fn main() -> Result<(), Error> {
             records.view(),
         )?,
     );
-    let points = polar_points(&elevation_rad, &[550.0, 600.0]);
+    let range_m = [550.0, 600.0];
+    let points = polar_points(&elevation_rad, &range_m);
     let radius = Radius::Fixed { radius_m: 2.0 };
     let maps = (
         scans.0.map(&points, &radius, None, &own)?,
         scans.1.map(&points, &radius, None, &plan.estimator)?,
     );
     println!("elevation_rad,range_m,level,own_m_s,periodogram_m_s");
-    for ((point, own), other) in points.iter().zip(&maps.0).zip(&maps.1) {
+    for (index, (own, other)) in maps.0.iter().zip(&maps.1).enumerate() {
         println!(
             "{:.3},{:.0},{},{:.3},{:.3}",
-            point.elevation_rad,
-            point.range_m,
+            elevation_rad[index / range_m.len()],
+            range_m[index % range_m.len()],
             own.level,
             own.estimate.velocity_m_s,
             other.estimate.velocity_m_s

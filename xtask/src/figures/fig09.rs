@@ -47,10 +47,7 @@ impl Accumulation {
     }
 
     fn level(&self, range_m: f64, radius_m: f64) -> Level {
-        let point = PolarPoint {
-            range_m,
-            elevation_rad: self.elevation_rad,
-        };
+        let point = PolarPoint::at_elevation(range_m, self.elevation_rad);
         let (windows, n_eff) = self.geometry.level(point, radius_m, &self.correlation);
         Level {
             radius_m,

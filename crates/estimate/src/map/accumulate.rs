@@ -247,7 +247,7 @@ impl Scan {
         let start = self.held.start;
         let numbers = self.numbers;
         let line_numbers = self.held.len() * numbers;
-        let line_blocks = self.blocks.len() / self.geometry.line_elevation_rad().len();
+        let line_blocks = self.blocks.len() / self.geometry.lines();
         let rows = &self.rows[chord.line * line_numbers..][..line_numbers];
         let blocks = &self.blocks[chord.line * line_blocks..][..line_blocks];
         let mut gate = chord.first;

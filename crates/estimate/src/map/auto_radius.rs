@@ -72,8 +72,7 @@ impl Radius {
     ) -> Result<Self, Error> {
         positive("target_m_s", target_m_s)?;
         let ranges_m = geometry.gate_ranges_m();
-        let lines = geometry.line_elevation_rad();
-        let elevation_rad = lines[lines.len() / 2];
+        let line = geometry.lines() / 2;
         let first_m = ranges_m[0];
         let last_m = ranges_m[ranges_m.len() - 1];
         let step_m = (last_m - first_m) / 64.0;
@@ -81,10 +80,7 @@ impl Radius {
         let mut table_m = Vec::with_capacity(65);
         for k in 0..=64 {
             let range_m = first_m + f64::from(k) * step_m;
-            let point = PolarPoint {
-                range_m,
-                elevation_rad,
-            };
+            let point = PolarPoint::on_line(range_m, line);
             let radius_m =
                 geometry.radius_for(point, information, &by_gates(range_m), largest_m)?;
             table_m.push(radius_m.unwrap_or(largest_m));

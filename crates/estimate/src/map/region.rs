@@ -11,25 +11,51 @@ use crate::error::{
 };
 use crate::window::{Gates, Sampling};
 
-/// A place in the scan plane.
+/// The line of sight of a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LineOfSight {
+    /// Index of a line of the scan.
+    Index(usize),
+    /// Elevation \[rad\] in a plane scan; it need not be that of a line.
+    Elevation(f64),
+}
+
+/// A point of a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PolarPoint {
     /// Distance from the lidar \[m\].
     pub range_m: f64,
-    /// Elevation of the line of sight \[rad\].
-    pub elevation_rad: f64,
+    /// Its line of sight.
+    pub line: LineOfSight,
 }
 
-/// All pairs of elevation \[rad\] and range \[m\], ranges running fastest: a map \[elevation, range\].
+impl PolarPoint {
+    /// The point at a range \[m\] on the line of sight of index `line`.
+    #[must_use]
+    pub fn on_line(range_m: f64, line: usize) -> Self {
+        Self {
+            range_m,
+            line: LineOfSight::Index(line),
+        }
+    }
+
+    /// The point at a range \[m\] and an elevation \[rad\] of a plane scan.
+    #[must_use]
+    pub fn at_elevation(range_m: f64, elevation_rad: f64) -> Self {
+        Self {
+            range_m,
+            line: LineOfSight::Elevation(elevation_rad),
+        }
+    }
+}
+
+/// All pairs of elevation \[rad\] and range \[m\] of a plane scan, ranges running fastest: a map \[elevation, range\].
 #[must_use]
 pub fn polar_points(elevation_rad: &[f64], range_m: &[f64]) -> Vec<PolarPoint> {
     let mut points = Vec::with_capacity(elevation_rad.len() * range_m.len());
     for &elevation_rad in elevation_rad {
         for &range_m in range_m {
-            points.push(PolarPoint {
-                range_m,
-                elevation_rad,
-            });
+            points.push(PolarPoint::at_elevation(range_m, elevation_rad));
         }
     }
     points
@@ -146,9 +172,10 @@ pub(crate) fn check_angles(elevation_rad: &[f64]) -> Result<(), Error> {
 /// Where the windows of a scan are. Rays (pulses) of equal elevation form one line of sight.
 #[derive(Debug, Clone)]
 pub struct ScanGeometry {
-    lines: Vec<f64>,
-    /// Directions of the lines, if they are not all in one plane, and with each the lines that may share its regions.
-    sphere: Option<Vec<([f64; 3], Range<usize>)>>,
+    /// Elevations of the lines of a plane scan; empty otherwise.
+    elevation_rad: Vec<f64>,
+    /// Direction of each line that is in no plane, and the lines that may share its regions; empty for a plane scan.
+    sphere: Vec<([f64; 3], Range<usize>)>,
     pub(crate) rays: Rays,
     first_range_m: f64,
     spacing_m: f64,
@@ -168,11 +195,11 @@ impl ScanGeometry {
     ) -> Result<Self, Error> {
         check_angles(elevation_rad)?;
         let (lines, rays) = Rays::grouped(elevation_rad);
-        Self::of(lines, rays, sampling, gates, record_samples)
+        Self::with_rays(rays, lines, Vec::new(), sampling, gates, record_samples)
     }
 
-    /// Geometry of lines of sight at `elevation_rad`, increasing, each with `rays_per_line` records that stand together, one
-    /// line after the other. It takes no memory for each ray.
+    /// Geometry of lines of sight at `elevation_rad`, increasing, each with `rays_per_line` consecutive records, one
+    /// line after the other. It needs no memory for each ray.
     ///
     /// # Errors
     /// As [`ScanGeometry::new`]; [`Error::OutOfRange`] for angles that do not increase or lines without rays.
@@ -189,18 +216,19 @@ impl ScanGeometry {
         let bounds = (0..=elevation_rad.len())
             .map(|line| line * rays_per_line)
             .collect();
-        Self::of(
-            elevation_rad.to_vec(),
+        Self::with_rays(
             Rays::in_order(bounds),
+            elevation_rad.to_vec(),
+            Vec::new(),
             sampling,
             gates,
             record_samples,
         )
     }
 
-    /// Geometry of lines of sight in any direction: unit vectors, one for each line. Their `elevation_rad` in points and maps is
-    /// their number, 0, 1, 2 and so on. Regions hold what is within a distance on lines that follow each other with the same
-    /// `group`: those of one sweep, not those of another time. Line `i` has the rays `first_ray[i] .. first_ray[i + 1]`.
+    /// Geometry of lines of sight in any direction: unit vectors, one for each line. Points have the index of their line. Regions hold
+    /// the windows within a distance on consecutive lines of the same `group`: those of one sweep, not those of another time. Line `i`
+    /// has the rays `first_ray[i] .. first_ray[i + 1]`.
     ///
     /// # Errors
     /// [`Error::Empty`] without lines, [`Error::Length`] for lists that do not match, and as [`Gates::count`].
@@ -216,32 +244,30 @@ impl ScanGeometry {
         not_empty("direction", lines)?;
         length("group", lines, group.len())?;
         length("first_ray", lines + 1, first_ray.len())?;
-        let parts = group.chunk_by(|a, b| a == b).scan(0, |start, part| {
-            let range = *start..*start + part.len();
-            *start = range.end;
-            Some(range)
-        });
-        let shared = parts.flat_map(|range| range.clone().map(move |_| range.clone()));
-        let sphere = direction.iter().copied().zip(shared).collect();
-        let numbers = (0..lines).map(|line| line as f64).collect();
+        let mut sphere = Vec::with_capacity(lines);
+        for part in group.chunk_by(|a, b| a == b) {
+            let start = sphere.len();
+            let shared = start..start + part.len();
+            for line in shared.clone() {
+                sphere.push((direction[line], shared.clone()));
+            }
+        }
         let rays = Rays::in_order(first_ray.to_vec());
-        Ok(Self {
-            sphere: Some(sphere),
-            ..Self::of(numbers, rays, sampling, gates, record_samples)?
-        })
+        Self::with_rays(rays, Vec::new(), sphere, sampling, gates, record_samples)
     }
 
-    fn of(
-        lines: Vec<f64>,
+    fn with_rays(
         rays: Rays,
+        elevation_rad: Vec<f64>,
+        sphere: Vec<([f64; 3], Range<usize>)>,
         sampling: &Sampling,
         gates: &Gates,
         record_samples: usize,
     ) -> Result<Self, Error> {
         sampling.validate()?;
         Ok(Self {
-            lines,
-            sphere: None,
+            elevation_rad,
+            sphere,
             rays,
             first_range_m: gates.range_m(0, sampling),
             spacing_m: gates.spacing_m(sampling),
@@ -249,10 +275,28 @@ impl ScanGeometry {
         })
     }
 
-    /// Elevations of the lines of sight \[rad\], increasing, each once.
+    /// Number of lines of sight.
+    #[must_use]
+    pub fn lines(&self) -> usize {
+        self.elevation_rad.len().max(self.sphere.len())
+    }
+
+    /// Elevations of the lines of sight of a plane scan \[rad\], increasing, each once; empty for lines in other directions.
     #[must_use]
     pub fn line_elevation_rad(&self) -> &[f64] {
-        &self.lines
+        &self.elevation_rad
+    }
+
+    /// All pairs of a line of sight and a range \[m\], ranges running fastest: a map \[line, range\].
+    #[must_use]
+    pub fn points(&self, range_m: &[f64]) -> Vec<PolarPoint> {
+        let mut points = Vec::with_capacity(self.lines() * range_m.len());
+        for line in 0..self.lines() {
+            for &range_m in range_m {
+                points.push(PolarPoint::on_line(range_m, line));
+            }
+        }
+        points
     }
 
     /// Rays (rows of the records) of a line of sight, increasing.
@@ -294,22 +338,8 @@ impl ScanGeometry {
     pub fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
         let slack_m = 1e-6 * self.spacing_m;
         let radius_m = radius_m + slack_m;
-        let own = self
-            .sphere
-            .as_ref()
-            .and_then(|sphere| sphere.get(point.elevation_rad as usize));
-        let near = own.map_or_else(
-            || self.lines_within(point, radius_m),
-            |(_, shared)| shared.clone(),
-        );
-        near.filter_map(move |line| {
-            let (sin, cos) = match (
-                own,
-                self.sphere.as_ref().and_then(|sphere| sphere.get(line)),
-            ) {
-                (Some((own, _)), Some((other, _))) => sin_cos_between(own, other),
-                _ => (self.lines[line] - point.elevation_rad).sin_cos(),
-            };
+        self.lines_near(point, radius_m).filter_map(move |line| {
+            let (sin, cos) = self.sin_cos_to(point.line, line);
             let across_m = point.range_m * sin;
             let along_m = point.range_m * cos;
             let half_m = (radius_m * radius_m - across_m * across_m).sqrt();
@@ -328,20 +358,44 @@ impl ScanGeometry {
         })
     }
 
-    /// Lines of a plane scan that may touch the disc.
-    fn lines_within(&self, point: PolarPoint, radius_m: f64) -> Range<usize> {
+    /// Lines that may touch the disc; none for a point on a line that the scan does not have.
+    fn lines_near(&self, point: PolarPoint, radius_m: f64) -> Range<usize> {
+        if let LineOfSight::Index(line) = point.line
+            && let Some((_, shared)) = self.sphere.get(line)
+        {
+            return shared.clone();
+        }
+        let Some(elevation_rad) = self.elevation_of(point.line) else {
+            return 0..0;
+        };
         let reach_rad = if radius_m < point.range_m {
             (radius_m / point.range_m).asin()
         } else {
             std::f64::consts::PI
         };
-        let start = self
-            .lines
-            .partition_point(|line| *line < point.elevation_rad - reach_rad);
-        let end = self
-            .lines
-            .partition_point(|line| *line <= point.elevation_rad + reach_rad);
+        let lines = &self.elevation_rad;
+        let start = lines.partition_point(|line| *line < elevation_rad - reach_rad);
+        let end = lines.partition_point(|line| *line <= elevation_rad + reach_rad);
         start..end.max(start)
+    }
+
+    /// Elevation of a line of sight of a plane scan \[rad\].
+    fn elevation_of(&self, line: LineOfSight) -> Option<f64> {
+        match line {
+            LineOfSight::Index(line) => self.elevation_rad.get(line).copied(),
+            LineOfSight::Elevation(elevation_rad) => Some(elevation_rad),
+        }
+    }
+
+    /// Sine and cosine of the angle between a line of sight and the line `other`.
+    fn sin_cos_to(&self, line: LineOfSight, other: usize) -> (f64, f64) {
+        if let LineOfSight::Index(line) = line
+            && let Some((direction, _)) = self.sphere.get(line)
+        {
+            return sin_cos_between(direction, &self.sphere[other].0);
+        }
+        let elevation_rad = self.elevation_of(line).unwrap_or(f64::NAN);
+        (self.elevation_rad[other] - elevation_rad).sin_cos()
     }
 
     /// Accumulation level and n_eff of a region when all samples are valid (figure 9), without any signal.
@@ -591,10 +645,7 @@ mod tests {
         let gates = Gates::new(64, 1, centre_s - 132.0 / 250e6).unwrap();
         let elevation_rad: Vec<f64> = (0..81).map(|i| (i as f64 - 40.0) * 0.5 / 400.0).collect();
         let geometry = ScanGeometry::new(&sampling(), &gates, &elevation_rad, 264).unwrap();
-        let point = PolarPoint {
-            range_m: 400.0,
-            elevation_rad: 0.0,
-        };
+        let point = PolarPoint::at_elevation(400.0, 0.0);
         (geometry, point)
     }
 
@@ -700,10 +751,7 @@ mod tests {
                     }
                 }
             }
-            let point = PolarPoint {
-                range_m: ranges_m[gate],
-                elevation_rad: line as f64,
-            };
+            let point = PolarPoint::on_line(ranges_m[gate], line);
             let found: Vec<_> = geometry
                 .chords(point, radius_m)
                 .flat_map(|chord| (chord.first..=chord.last).map(move |gate| (chord.line, gate)))
@@ -731,10 +779,7 @@ mod tests {
             (ranges_m[5], 0.1, 0.0),
             (500.0, 0.0, 2.0),
         ] {
-            let point = PolarPoint {
-                range_m,
-                elevation_rad,
-            };
+            let point = PolarPoint::at_elevation(range_m, elevation_rad);
             let mut inside = vec![];
             for (line, angle_rad) in geometry.line_elevation_rad().iter().enumerate() {
                 for (gate, r_m) in ranges_m.iter().enumerate() {

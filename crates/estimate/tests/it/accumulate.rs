@@ -43,6 +43,9 @@ fn scan(records: &Array2<f64>, elevation_rad: &[f64]) -> Scan {
 
 /// Mean correlogram and number of the valid windows near a point, window by window.
 fn plain_mean(records: &Array2<f64>, point: PolarPoint, radius_m: f64) -> (Vec<f64>, usize) {
+    let LineOfSight::Elevation(elevation_rad) = point.line else {
+        panic!("{point:?} has no elevation");
+    };
     let weights = Weighting::default().weights(64).unwrap();
     let (mut mean, mut level) = (vec![0.0; 64], 0);
     for (ray, angle_rad) in elevations_rad().iter().enumerate() {
@@ -54,7 +57,7 @@ fn plain_mean(records: &Array2<f64>, point: PolarPoint, radius_m: f64) -> (Vec<f
         {
             let (a, b) = (
                 Complex::from_polar(*range_m, *angle_rad),
-                Complex::from_polar(point.range_m, point.elevation_rad),
+                Complex::from_polar(point.range_m, elevation_rad),
             );
             let window = records.slice(s![ray, gate..gate + 64]).to_vec();
             if (a - b).norm() > radius_m || !window.iter().all(|x| x.is_finite()) {
@@ -83,10 +86,7 @@ fn region_mean_is_the_running_mean_of_table_3() {
         (450.0, 0.0, 1.0),
         (430.0, 0.02, 30.0),
     ] {
-        let point = PolarPoint {
-            range_m,
-            elevation_rad,
-        };
+        let point = PolarPoint::at_elevation(range_m, elevation_rad);
         let (expected, level) = plain_mean(&records, point, radius_m);
         assert!(level > 0);
         assert_eq!(scan.region_mean(point, radius_m, &mut mean).unwrap(), level);
@@ -105,10 +105,7 @@ fn order_of_rays_does_not_matter() {
     let shuffled = records.select(Axis(0), &order);
     let angles_rad: Vec<f64> = order.iter().map(|&ray| elevations_rad()[ray]).collect();
     let other = scan(&shuffled, &angles_rad);
-    let point = PolarPoint {
-        range_m: 400.0,
-        elevation_rad: 0.01,
-    };
+    let point = PolarPoint::at_elevation(400.0, 0.01);
     let (mut a, mut b) = (vec![0.0; 64], vec![0.0; 64]);
     assert_eq!(
         forward.region_mean(point, 5.0, &mut a).unwrap(),
@@ -126,13 +123,7 @@ fn records_that_come_in_pieces_give_the_same_bits() {
     records.row_mut(4).mapv_inplace(|x| 5.0 * x);
     records.row_mut(7).mapv_inplace(|x| 3e4 * x);
     records[[5, 200]] = f64::NAN;
-    let (statistic, point) = (
-        plan().statistic,
-        PolarPoint {
-            range_m: 400.0,
-            elevation_rad: 0.01,
-        },
-    );
+    let (statistic, point) = (plan().statistic, PolarPoint::at_elevation(400.0, 0.01));
     let correlation = WindowCorrelation::from_gate_lags(&[1.0, 0.9, 0.7, 0.4]).unwrap();
     let lines_rad = [0.0, 0.004, 0.01, 0.013];
     let rays_rad: Vec<f64> = lines_rad.iter().flat_map(|&el| [el, el]).collect();
@@ -179,10 +170,7 @@ fn sums_of_some_gates_have_the_bits_of_whole_records() {
             .scaled_for(largest);
         sums.add(0, part.view()).unwrap();
         let scan = sums.finish();
-        let point = PolarPoint {
-            range_m: 400.0,
-            elevation_rad: 0.01,
-        };
+        let point = PolarPoint::at_elevation(400.0, 0.01);
         let mut mean = vec![0.0; statistic.statistic_len()];
         let level = scan.region_mean(point, radius_m, &mut mean).unwrap();
         let bits: Vec<u64> = mean.iter().map(|m| m.to_bits()).collect();
@@ -407,18 +395,9 @@ fn regions_without_windows_are_empty_and_say_so() {
     let scan = scan(&uniform_wind(), &elevations_rad());
     let correlation = WindowCorrelation::from_gate_lags(&[1.0, 0.9, 0.5]).unwrap();
     let far = [
-        PolarPoint {
-            range_m: 5000.0,
-            elevation_rad: 0.01,
-        },
-        PolarPoint {
-            range_m: 400.0,
-            elevation_rad: -0.5,
-        },
-        PolarPoint {
-            range_m: 400.0,
-            elevation_rad: 0.0105,
-        },
+        PolarPoint::at_elevation(5000.0, 0.01),
+        PolarPoint::at_elevation(400.0, -0.5),
+        PolarPoint::at_elevation(400.0, 0.0105),
     ];
     let radius = Radius::Fixed { radius_m: 0.1 };
     for found in scan
@@ -438,10 +417,7 @@ fn n_eff_counts_pulses_and_leaves_out_what_is_missing() {
     let mut records = uniform_wind();
     let identical = WindowCorrelation::from_gate_lags(&[1.0; 400]).unwrap();
     let range_m = gates().range_m(150, &table_2());
-    let point = PolarPoint {
-        range_m,
-        elevation_rad: 0.012,
-    };
+    let point = PolarPoint::at_elevation(range_m, 0.012);
     // two pulses of the line of sight at 12 mrad, 3 windows each, fully correlated within a pulse
     let radius_m = 0.7;
     let both = scan(&records, &elevations_rad());
@@ -598,10 +574,7 @@ fn automatic_radius_is_the_smallest_that_reaches_the_target() {
     let mut before_m = 0.0;
     for range_m in [380.0, 450.0, 600.0, 800.0] {
         let radius_m = radius.at_m(range_m).unwrap();
-        let point = PolarPoint {
-            range_m,
-            elevation_rad: elevation_rad[50],
-        };
+        let point = PolarPoint::at_elevation(range_m, elevation_rad[50]);
         let std_m_s = |radius_m: f64| {
             geometry
                 .information(point, radius_m, &by_gates(range_m))
@@ -619,10 +592,7 @@ fn automatic_radius_is_the_smallest_that_reaches_the_target() {
     let modest = Radius::for_standard_deviation(&geometry, by_gates, 1e-3, 5.0).unwrap();
     assert_eq!(modest.at_m(600.0).unwrap(), 5.0);
     assert!(Radius::for_standard_deviation(&geometry, by_gates, 0.0, 5.0).is_err());
-    let point = PolarPoint {
-        range_m: 400.0,
-        elevation_rad: 0.05,
-    };
+    let point = PolarPoint::at_elevation(400.0, 0.05);
     assert_eq!(
         geometry
             .radius_for(point, 1e9, &by_gates(400.0), 5.0)

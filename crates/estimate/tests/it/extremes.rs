@@ -62,10 +62,7 @@ fn single(statistic: &dyn Statistic<f64>, estimator: &dyn Estimator, window: &[f
     let gates = Gates::new(window.len(), 1, 2e-6).unwrap();
     let records = Array2::from_shape_vec((1, window.len()), window.to_vec()).unwrap();
     let scan = Scan::new(statistic, &table_2(), &gates, &[0.0], records.view()).unwrap();
-    let point = PolarPoint {
-        range_m: scan.geometry().gate_ranges_m()[0],
-        elevation_rad: 0.0,
-    };
+    let point = PolarPoint::at_elevation(scan.geometry().gate_ranges_m()[0], 0.0);
     scan.map(&[point], &Radius::Fixed { radius_m: 0.0 }, None, estimator)
         .unwrap()[0]
 }
@@ -263,10 +260,7 @@ fn regions_cut_by_the_edge_of_the_sector_count_what_they_hold() {
         records.view(),
     )
     .unwrap();
-    let at = |elevation_rad| PolarPoint {
-        range_m: 400.0,
-        elevation_rad,
-    };
+    let at = |elevation_rad| PolarPoint::at_elevation(400.0, elevation_rad);
     let mut mean = vec![0.0; 17];
     let inside = scan.region_mean(at(0.004), 1.3, &mut mean).unwrap();
     let edge = scan.region_mean(at(0.0), 1.3, &mut mean).unwrap();

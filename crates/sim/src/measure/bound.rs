@@ -89,7 +89,6 @@ struct Setting<'p> {
     places: ScanGeometry,
     covariance: WindowCovariance,
     radius: Radius,
-    elevation_rad: f64,
 }
 
 impl<'p> Setting<'p> {
@@ -102,14 +101,11 @@ impl<'p> Setting<'p> {
         let of_rays = RayInformation::new(plan, &scanner.layer_snr())?;
         let radius = region_radius(&of_rays, &places)?;
         let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
-        let lines = places.line_elevation_rad();
-        let elevation_rad = lines[lines.len() / 2];
         Ok(Self {
             of_rays,
             places,
             covariance,
             radius,
-            elevation_rad,
         })
     }
 
@@ -149,10 +145,7 @@ impl<'p> Setting<'p> {
     }
 
     fn point(&self, range_m: f64) -> PolarPoint {
-        PolarPoint {
-            range_m,
-            elevation_rad: self.elevation_rad,
-        }
+        PolarPoint::on_line(range_m, self.places.lines() / 2)
     }
 
     /// From the ratio of the air at the range and that of a window there, and the information of a window and of the region.

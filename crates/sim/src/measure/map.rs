@@ -17,7 +17,6 @@ use num_complex::Complex;
 use wakescope_estimate::{
     Scan,
     map::{ErrorMap, PolarPoint, ScanGeometry, ScanSums},
-    polar_points,
     window::Sample,
 };
 use wakescope_signal::RangeFilter;
@@ -95,7 +94,7 @@ impl<'p, S: Sample> Mapper<'p, S> {
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let places = places(scene, g)?;
         let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
-        let points = polar_points(places.line_elevation_rad(), &g.gate_range_m);
+        let points = places.points(&g.gate_range_m);
         let radius_m = g
             .gate_range_m
             .iter()

@@ -98,7 +98,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         let found = scan.map(points, &self.radius, None, &*self.tools.estimator)?;
         let gates = points
             .iter()
-            .take_while(|p| p.elevation_rad == points[0].elevation_rad)
+            .take_while(|p| p.line == points[0].line)
             .count()
             .max(1);
         // Speckle and noise share out the spectrum of a gate as its own signal-to-noise ratio says.

@@ -195,14 +195,10 @@ pub(crate) fn warnings(plan: &Plan) -> Result<Option<String>, Error> {
     let gates_m = &plan.geometry.gate_range_m;
     let windows = region::places(plan.scene(), &plan.geometry)?;
     let windows_m = windows.gate_ranges_m();
-    let elevation_rad = windows.line_elevation_rad()[0];
     let mut empty = 0;
     let mut farthest_m = 0.0_f64;
     for &range_m in gates_m {
-        let point = PolarPoint {
-            range_m,
-            elevation_rad,
-        };
+        let point = PolarPoint::on_line(range_m, 0);
         let mut chords = windows.chords(point, e.largest_radius_m(range_m));
         if chords.next().is_none() {
             empty += 1;

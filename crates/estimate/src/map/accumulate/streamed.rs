@@ -84,7 +84,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
             gates: *gates,
             record_samples: gates.samples(&held).len(),
             numbers,
-            rows: vec![0.0; geometry.line_elevation_rad().len() * held.len() * numbers],
+            rows: vec![0.0; geometry.lines() * held.len() * numbers],
             geometry,
             held,
             rule: MissingRule::NOT_FINITE,
@@ -195,7 +195,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         let skipped = (held.start.next_multiple_of(BLOCK) - held.start).min(held.len());
         let line_numbers = held.len() * numbers;
         let line_blocks = (held.len() - skipped).div_ceil(BLOCK) * numbers;
-        let mut blocks = vec![0.0; geometry.line_elevation_rad().len() * line_blocks];
+        let mut blocks = vec![0.0; geometry.lines() * line_blocks];
         for_each_chunk(
             &mut blocks,
             line_blocks.max(1),
@@ -230,7 +230,7 @@ fn valid_before(
     gates: usize,
     invalid: &BTreeMap<usize, Vec<bool>>,
 ) -> Vec<usize> {
-    let lines = geometry.line_elevation_rad().len();
+    let lines = geometry.lines();
     let mut counts = Vec::with_capacity(lines * (gates + 1));
     for line in 0..lines {
         let mut broken: Vec<&Vec<bool>> = Vec::new();

@@ -13,7 +13,6 @@ use crate::plan::Plan;
 use crate::plan::estimators::ExpectedBias;
 use crate::scene::NoiseModel;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry};
-use wakescope_estimate::polar_points;
 
 /// Signal-to-noise ratios of the curve, dB.
 const SNR_DB: std::ops::RangeInclusive<i32> = -40..=60;
@@ -96,7 +95,7 @@ impl PredictedError {
 /// What the estimators refuse; a checked scene gives none.
 pub fn predicted_table(plan: &Plan, map: &VelocityEstimates) -> Result<Table, Error> {
     let places = places(plan.scene(), &plan.geometry)?;
-    let points = polar_points(places.line_elevation_rad(), &map.range_m);
+    let points = places.points(&map.range_m);
     let largest_m = map.radius_m.iter().copied().fold(0.0, f64::max);
     let predicted = PredictedError::new(plan, places, largest_m)?;
     let gates = map.range_m.len();
@@ -191,12 +190,8 @@ mod tests {
             let plan = plan("", estimator);
             let found = bound(&plan, &Silent).unwrap().by_range[3];
             let places = places(plan.scene(), &plan.geometry).unwrap();
-            let elevation_rad = places.line_elevation_rad()[2];
             let predicted = PredictedError::new(&plan, places, 3.0).unwrap();
-            let point = PolarPoint {
-                range_m: found.range_m,
-                elevation_rad,
-            };
+            let point = PolarPoint::on_line(found.range_m, 2);
             let of = |level: f64, snr_db: f64| predicted.deviation_m_s(point, 3.0, level, snr_db);
             let whole = found.level as f64;
             assert!(

@@ -97,10 +97,7 @@ pub(super) fn measured(
 
 /// The place of a gate of a line.
 fn point(plan: &Plan, lines: &ScanLines, (line, gate): (usize, usize)) -> PolarPoint {
-    PolarPoint {
-        range_m: plan.geometry.gate_range_m[gate],
-        elevation_rad: lines.elevation_rad[line],
-    }
+    PolarPoint::at_elevation(plan.geometry.gate_range_m[gate], lines.elevation_rad[line])
 }
 
 /// Power of the gates without a signal over that of the scene's noise, from the means over the lines.

@@ -67,10 +67,7 @@ impl Spectra {
         for &elevation_rad in &g.elevation_rad {
             for &range_m in &g.gate_range_m {
                 let (point, radius_m) = (
-                    PolarPoint {
-                        range_m,
-                        elevation_rad,
-                    },
+                    PolarPoint::at_elevation(range_m, elevation_rad),
                     estimator.radius.at_m(range_m)?,
                 );
                 density.extend(of_gate.density(

@@ -180,10 +180,7 @@ mod tests {
                 // What the estimates at the corners depend on: their windows.
                 for line in [tile.lines.start, tile.lines.end - 1] {
                     for gate in [tile.gates.start, tile.gates.end - 1] {
-                        let point = PolarPoint {
-                            range_m: range_m[gate],
-                            elevation_rad: elevation_rad[line],
-                        };
+                        let point = PolarPoint::at_elevation(range_m[gate], elevation_rad[line]);
                         for chord in places.chords(point, 5.0) {
                             assert!(read.contains(&chord.line), "{point:?} {chord:?} {tile:?}");
                             assert!(
