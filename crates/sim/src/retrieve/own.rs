@@ -74,7 +74,8 @@ impl SceneResponse {
                 ..MapFitOptions::default()
             },
         };
-        let sector = (&map.elevation_rad[..], &map.range_m[..]);
+        let reach_m = self.reach_m(&map.range_m);
+        let sector = (&map.elevation_rad[..], &reach_m[..]);
         let is_seen = |vortex: &VortexResult| options.model.sees(sector, vortex.place_m());
         let unseen = |pair: &ScanResult| {
             pair.vortices
@@ -113,15 +114,19 @@ impl SceneResponse {
 
     /// Whether the vortices of a pair are reported where means do not show both: both are in view and each circulation exceeds its standard error.
     fn are_reported(&self, pair: &ScanResult, map: &ScanMap, model: &WakeModel) -> bool {
-        // the outermost gates see half a window beyond their middles
-        let half_window_m =
-            0.5 * self.scene.estimator.window_samples as f64 * self.scene.sample_spacing_m();
-        let [near_m, far_m] = ends_m(&map.range_m);
-        let range_m = [near_m - half_window_m, far_m + half_window_m];
+        let reach_m = self.reach_m(&map.range_m);
         let is_reported = |vortex: &VortexResult| {
-            model.sees((&map.elevation_rad, &range_m), vortex.place_m()) && is_likely(vortex)
+            model.sees((&map.elevation_rad, &reach_m), vortex.place_m()) && is_likely(vortex)
         };
         pair.vortices.iter().all(is_reported)
+    }
+
+    /// Nearest and farthest range that gates at those ranges observe, m: the outermost ones reach half a window beyond their middles.
+    fn reach_m(&self, range_m: &[f64]) -> [f64; 2] {
+        let half_window_m =
+            0.5 * self.scene.estimator.window_samples as f64 * self.scene.sample_spacing_m();
+        let [near_m, far_m] = ends_m(range_m);
+        [near_m - half_window_m, far_m + half_window_m]
     }
 }
 
