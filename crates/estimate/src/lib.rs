@@ -40,6 +40,7 @@
 //! | [`wake_detection`] | whether a scan holds a wake: threshold for a rate of false alarms, smallest circulation that is found |
 //! | [`retrieval`] | from one scan of any instrument to its vortices, or none; tracks |
 //! | [`wind_profile`] | winds from beams in several directions: VAD with covariance, DBS |
+//! | `matched_filter` | how well vortices at many positions explain a scan: for the test for a wake, and for first guesses of fits |
 //! | `linalg`, `parallel` | solve and eigenvectors with residual checks, the bundled LAPACK; loops on the caller's threads |
 //!
 //! Features:
@@ -60,6 +61,7 @@ mod error;
 pub mod estimators;
 mod linalg;
 pub mod map;
+mod matched_filter;
 mod measured;
 pub mod models;
 mod parallel;

@@ -13,6 +13,7 @@ use crate::retrieval::report::COMPETES;
 use crate::retrieval::{Movement, RetrievalOptions, ScanMap};
 use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::map_fit::gates::Gates;
+use crate::vortex_fit::map_fit::guess::SEARCHED;
 use crate::vortex_fit::{Parameter, Wake};
 
 /// Fastest wind that is tried \[m/s\]: no aircraft lands in a faster cross wind by far.
@@ -23,8 +24,6 @@ const START: f64 = 0.5;
 const SAME: f64 = 0.25;
 /// Most aliases on either side.
 const MOST_ALIASES: f64 = 20.0;
-/// Velocities in which the winds are fitted: blocks stand for more.
-const SEARCHED: usize = 1200;
 
 /// A scan without vortices and without wind.
 pub(super) const CALM: [f64; 10] = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0];

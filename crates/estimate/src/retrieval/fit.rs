@@ -13,12 +13,12 @@ use crate::retrieval::whitening::Whitening;
 use crate::retrieval::{Flag, Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
 use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::map_fit::gates::Gates;
+use crate::vortex_fit::map_fit::guess::SEARCHED;
 use crate::vortex_fit::{Loss, Wake};
 
-/// Most velocities that are whitened, that are fitted, and that are searched for a wake: blocks stand for more.
+/// Most velocities that are whitened, and that are fitted: blocks stand for more.
 const WHITENED: usize = 1500;
 pub(super) const MOST: usize = 16_000;
-const SEARCHED: usize = 1200;
 /// Most winds that are assumed in turn.
 const OTHER_WINDS: usize = 3;
 /// A statistic below this part of the threshold in medians, which tell two thirds of what all velocities do, is no wake.

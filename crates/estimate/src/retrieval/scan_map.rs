@@ -5,11 +5,8 @@
 use ndarray::Array2;
 
 use crate::error::{Error, finite, length, positive};
-use crate::vortex_fit::map_fit::data::{block_means, median};
+use crate::vortex_fit::map_fit::data::{BlockMedians, block_means, median};
 use crate::vortex_fit::{VelocityMap, Wake, WakeModel};
-
-/// Deviation of the median of many normal numbers over that of their mean.
-const MEDIAN_OVER_MEAN: f64 = 1.253_314_137_315_500_3;
 
 /// A map of radial velocities with the times of its lines.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,32 +82,14 @@ impl ScanMap {
         if by_line * by_gate == 1 {
             return None;
         }
-        let (elevation_rad, range_m) = (
-            block_means(&self.elevation_rad, by_line),
-            block_means(&self.range_m, by_gate),
-        );
-        let mut velocity_m_s = Array2::from_elem((elevation_rad.len(), range_m.len()), f64::NAN);
-        let mut sigma_m_s = Array2::ones(velocity_m_s.raw_dim());
-        for ((block, velocity), sigma) in velocity_m_s.indexed_iter_mut().zip(&mut sigma_m_s) {
-            let known = self.view().known_in(block, (by_line, by_gate));
-            let Some(count) = (!known.is_empty()).then_some(known.len() as f64) else {
-                continue;
-            };
-            let mut values: Vec<f64> = known.iter().map(|cell| self.velocity_m_s[*cell]).collect();
-            values.sort_by(f64::total_cmp);
-            *velocity = 0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2]);
-            let stated = self
-                .sigma_m_s
-                .as_ref()
-                .map(|sigma| known.iter().map(|cell| sigma[*cell]).sum::<f64>() / count);
-            let wider = if values.len() > 2 {
-                MEDIAN_OVER_MEAN
-            } else {
-                1.0
-            };
-            *sigma = stated.unwrap_or(1.0) * wider / count.sqrt();
-        }
-        let (time_s, fold_m_s) = (block_means(&self.time_s, by_line), self.fold_m_s);
+        let BlockMedians {
+            elevation_rad,
+            range_m,
+            velocity_m_s,
+            sigma_m_s,
+        } = self.view().block_medians((by_line, by_gate));
+        let time_s = block_means(&self.time_s, by_line);
+        let fold_m_s = self.fold_m_s;
         let sigma_m_s = self.sigma_m_s.is_some().then_some(sigma_m_s);
         Some(Self {
             elevation_rad,

@@ -4,12 +4,9 @@
 
 use ndarray::Array2;
 
-use crate::parallel::map_indexed;
+use crate::matched_filter::Cells;
 use crate::retrieval::Turbulence;
-use crate::vortex_fit::wake::pair::Ray;
-use crate::vortex_fit::wake::range_kernel::LineScratch;
-use crate::vortex_fit::{RangeKernel, Wake, WakeModel};
-use crate::wake_detection::cells::Cells;
+use crate::vortex_fit::WakeModel;
 
 /// Distance of places \[m\] where lines and gates are closer; between them a wake loses little of its statistic.
 const STEP_M: f64 = 4.0;
@@ -18,8 +15,6 @@ const STEP_OVER_GATE: f64 = 0.4;
 /// Places of a large scan, and how many times more there may be where pairs are close: their number is squared in memory and cubed in time.
 const MOST_PLACES: f64 = 1200.0;
 const MANY: f64 = 2.0;
-/// So many standard deviations of a gate from a vortex the air of the gate is alike: its middle shows the mean to a hundredth of what little it is.
-const FAR_OVER_GATE: f64 = 10.0;
 /// Core radius over the distance of places: what lies between them is not missed.
 const CORE_OVER_STEP: f64 = 0.5;
 
@@ -125,67 +120,6 @@ impl Bank {
             templates,
         }
     }
-
-    /// What an anticlockwise vortex of unit circulation at each place shows: cells by places.
-    pub(super) fn shapes(
-        &self,
-        cells: &Cells,
-        model: &WakeModel,
-        kernel: &RangeKernel,
-    ) -> Array2<f64> {
-        let columns = map_indexed(
-            self.places_m.len(),
-            LineScratch::default,
-            |scratch, place| {
-                let wake = Wake::of_unit_vortex(self.places_m[place], self.core_m);
-                shown(&wake, cells, model, kernel, scratch)
-            },
-        );
-        Array2::from_shape_fn((cells.cells.len(), columns.len()), |(cell, place)| {
-            columns[place][cell]
-        })
-    }
-}
-
-/// What a wake shows in each cell \[m/s\].
-pub(super) fn shown(
-    wake: &Wake,
-    cells: &Cells,
-    model: &WakeModel,
-    kernel: &RangeKernel,
-    scratch: &mut LineScratch,
-) -> Vec<f64> {
-    let ranges = &cells.range_m;
-    let (middle, reach_m) = (kernel.middle(), FAR_OVER_GATE * kernel.width_m());
-    let [one_m, other_m] =
-        [&wake.left, &wake.right].map(|vortex| model.range_and_elevation(vortex.place_m()).0);
-    let from = ranges.partition_point(|range_m| *range_m < one_m.min(other_m) - reach_m);
-    let to = ranges.partition_point(|range_m| *range_m <= one_m.max(other_m) + reach_m);
-    let mut map = Array2::zeros((cells.elevation_rad.len(), ranges.len()));
-    for (mut line, &elevation_rad) in map.rows_mut().into_iter().zip(&cells.elevation_rad) {
-        let seen = (model, wake, Ray::new(elevation_rad));
-        kernel.apply(
-            seen,
-            &ranges[from..to],
-            false,
-            scratch,
-            |gate, velocity, _| line[from + gate] = velocity,
-        );
-        for gate in (0..from).chain(to..ranges.len()) {
-            middle.apply(
-                seen,
-                &ranges[gate..=gate],
-                false,
-                scratch,
-                |_, velocity, _| line[gate] = velocity,
-            );
-        }
-    }
-    cells
-        .cells
-        .iter()
-        .map(|cell| map[[cell.line, cell.gate]])
-        .collect()
 }
 
 #[cfg(test)]

@@ -7,15 +7,15 @@
 //! x the velocities, made white; s what a wake of the bank shows, made white, the wind taken out, of unit length. Products with
 //! single vortices are taken once and combined to those of pairs. Check: against a direct least-squares fit; drawn scans.
 
-use ndarray::{Array1, Array2, ArrayView1, Axis, s};
+use ndarray::{Array1, Array2, ArrayView1, s};
 
 use crate::error::{Error, enough_velocities, increasing, not_empty, positive};
 use crate::linalg::cholesky::cholesky;
+use crate::matched_filter::{Background, Cells, MatchedFilter, wind_velocities};
 use crate::retrieval::{Gate, ScanMap};
 use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
-use crate::wake_detection::bank::{Bank, DetectorOptions, Template, shown};
-use crate::wake_detection::cells::{Background, Cells};
+use crate::wake_detection::bank::{Bank, DetectorOptions, Template};
 
 /// One part in so many of the cells may be missing in a scan.
 const MISSING: usize = 2;
@@ -28,16 +28,9 @@ const WAKE_M: f64 = 25.0;
 /// The test of one scan's geometry, noise and background for a wake.
 #[derive(Debug, Clone)]
 pub struct WakeDetector {
-    pub(super) model: WakeModel,
-    kernel: RangeKernel,
-    pub(super) cells: Cells,
-    background: Background,
+    pub(super) filter: MatchedFilter,
     pub(super) bank: Bank,
     pub(super) spacing_m: (f64, f64),
-    /// Uniform wind and shear, white and orthonormal: cells by one or two.
-    wind: Array2<f64>,
-    /// What single vortices show, white, without wind: places by cells.
-    shapes: Array2<f64>,
     /// For each wake of the bank, the reciprocal of its length.
     reciprocal_length: Vec<f64>,
     /// Lower factor of the covariance of the products of an empty scan with all places.
@@ -96,12 +89,14 @@ impl WakeDetector {
         let kernel = kernel(gate)?;
         let bank = Bank::new(&cells, model, kernel.width_m(), options);
         not_empty("list of wakes that fit into the scan", bank.templates.len())?;
-        let mut shapes = bank.shapes(&cells, model, &kernel);
-        background.whiten(&mut shapes);
-        let wind = wind(&cells, &background);
-        remove(&wind, &mut shapes);
-        let gram = shapes.t().dot(&shapes);
-        let shapes = shapes.t().as_standard_layout().into_owned();
+        let (filter, gram) = MatchedFilter::new(
+            model,
+            kernel,
+            cells,
+            background,
+            &bank.places_m,
+            bank.core_m,
+        );
         let reciprocal_length = bank
             .templates
             .iter()
@@ -117,14 +112,9 @@ impl WakeDetector {
             reason,
         })?;
         Ok(Self {
-            model: *model,
-            kernel,
-            cells,
-            background,
+            filter,
             bank,
             spacing_m: options.spacing_m,
-            wind,
-            shapes,
             reciprocal_length,
             factor,
         })
@@ -139,20 +129,24 @@ impl WakeDetector {
         &self,
         velocity_m_s: ndarray::ArrayView2<'_, f64>,
     ) -> Result<WakeStatistic, Error> {
-        let mut means = self.cells.means(velocity_m_s)?;
+        let mut means = self.filter.cells.means(velocity_m_s)?;
         let missing = self.fill(&mut means)?;
-        let white = self.white(means);
-        let products = self.shapes.dot(&white);
+        let white = self.filter.white(means);
+        let products = self.filter.shapes.dot(&white);
         let (value, best) = self.best(products.view());
         let rest = white.dot(&white);
-        let dof =
-            |fitted: usize| (self.cells.cells.len() - missing - self.wind.ncols() - fitted) as f64;
+        let dof = |fitted: usize| {
+            (self.filter.cells.cells.len() - missing - self.filter.wind.ncols() - fitted) as f64
+        };
         let length = self.reciprocal_length[best];
         let template = &self.bank.templates[best];
         let mut left = white;
         for (place, sense) in template.iter().zip([-1.0, 1.0]) {
             let Some(place) = place else { continue };
-            left.scaled_add(-sense * value.sqrt() * length, &self.shapes.row(*place));
+            left.scaled_add(
+                -sense * value.sqrt() * length,
+                &self.filter.shapes.row(*place),
+            );
         }
         let [along, across] = self.neighbour_correlation(&left, template);
         Ok(WakeStatistic {
@@ -170,8 +164,9 @@ impl WakeDetector {
     fn fill(&self, means: &mut [f64]) -> Result<usize, Error> {
         let missing = means.iter().filter(|value| value.is_nan()).count();
         enough_velocities(means.len() - missing, means.len() - means.len() / MISSING)?;
-        let cells = &self.cells.cells;
-        let row = |i: usize| wind_row(&self.cells, i).map(|x| x / cells[i].deviation_m_s);
+        let cells = &self.filter.cells.cells;
+        let row =
+            |i: usize| wind_velocities(&self.filter.cells, i).map(|x| x / cells[i].deviation_m_s);
         let (mut curvature, mut towards) = (Array2::zeros((2, 2)), [0.0; 2]);
         for i in (0..means.len()).filter(|&i| means[i].is_finite()) {
             let (row, value) = (row(i), means[i] / cells[i].deviation_m_s);
@@ -187,7 +182,7 @@ impl WakeDetector {
             .enumerate()
             .filter(|(_, value)| value.is_nan())
         {
-            *value = wind_row(&self.cells, i)
+            *value = wind_velocities(&self.filter.cells, i)
                 .iter()
                 .zip(&wind)
                 .map(|(row, wind)| row * wind)
@@ -199,10 +194,13 @@ impl WakeDetector {
     /// Correlation of white numbers by cell with those of the next gate and the next line, far from a wake, each with its error.
     fn neighbour_correlation(&self, numbers: &Array1<f64>, template: &Template) -> [(f64, f64); 2] {
         let mut grid = Array2::from_elem(
-            (self.cells.elevation_rad.len(), self.cells.range_m.len()),
+            (
+                self.filter.cells.elevation_rad.len(),
+                self.filter.cells.range_m.len(),
+            ),
             f64::NAN,
         );
-        for (cell, number) in self.cells.cells.iter().zip(numbers) {
+        for (cell, number) in self.filter.cells.cells.iter().zip(numbers) {
             let mut centres = template
                 .iter()
                 .flatten()
@@ -222,14 +220,6 @@ impl WakeDetector {
         let along = mean(&grid.slice(s![.., 1..]) * &grid.slice(s![.., ..-1]));
         let across = mean(&grid.slice(s![1.., ..]) * &grid.slice(s![..-1, ..]));
         [along, across].map(|(product, count): (f64, f64)| (product / power, count.sqrt().recip()))
-    }
-
-    /// Numbers by cell, made white, without what wind explains.
-    fn white(&self, mut numbers: Vec<f64>) -> Array1<f64> {
-        self.background.whiten_one(&mut numbers);
-        let white = Array1::from_vec(numbers);
-        let part = self.wind.t().dot(&white);
-        white - self.wind.dot(&part)
     }
 
     /// Statistic and index of the best wake of the bank, given the products of a scan with all places.
@@ -258,15 +248,8 @@ impl WakeDetector {
     /// Products of what a wake shows with all places, and its length: the reciprocal of the standard deviation of a factor on its
     /// circulations, were places and cores known.
     pub(super) fn products_of(&self, wake: &Wake) -> (Array1<f64>, f64) {
-        let shown = shown(
-            &Wake::calm(wake.left, wake.right),
-            &self.cells,
-            &self.model,
-            &self.kernel,
-            &mut Default::default(),
-        );
-        let white = self.white(shown);
-        (self.shapes.dot(&white), white.dot(&white).sqrt())
+        let white = self.filter.white_shape(wake);
+        (self.filter.shapes.dot(&white), white.dot(&white).sqrt())
     }
 
     fn wake(&self, &[left, right]: &Template, circulation_m2_s: f64) -> Wake {
@@ -301,40 +284,6 @@ fn kernel(gate: &Gate) -> Result<RangeKernel, Error> {
         Gate::Kernel(kernel) => Ok(kernel.coarser(2)),
         Gate::Point | Gate::Gaussian { .. } => RangeKernel::new(0.0, 1.0, &[1.0]),
     }
-}
-
-/// Uniform wind and shear, white and orthonormal; one direction if the scan cannot tell them apart.
-fn wind(cells: &Cells, background: &Background) -> Array2<f64> {
-    let mut wind = Array2::from_shape_fn((cells.cells.len(), 2), |(i, direction)| {
-        wind_row(cells, i)[direction]
-    });
-    background.whiten(&mut wind);
-    let mut basis = Array2::zeros((cells.cells.len(), 0));
-    for direction in wind.columns() {
-        let mut direction = direction.to_owned().insert_axis(Axis(1));
-        let before = direction.iter().map(|x| x * x).sum::<f64>();
-        remove(&basis, &mut direction);
-        let after = direction.iter().map(|x| x * x).sum::<f64>();
-        if after > 1e-12 * before {
-            direction /= after.sqrt();
-            // as many rows as the basis has
-            let _ = basis.append(Axis(1), direction.view());
-        }
-    }
-    basis
-}
-
-/// What uniform wind and shear show in a cell.
-fn wind_row(cells: &Cells, index: usize) -> [f64; 2] {
-    let cell = &cells.cells[index];
-    let cos = cells.elevation_rad[cell.line].cos();
-    [cos, cos * cell.place_m.1]
-}
-
-/// Takes the part along an orthonormal basis out of columns.
-fn remove(basis: &Array2<f64>, columns: &mut Array2<f64>) {
-    let part = basis.t().dot(columns);
-    ndarray::linalg::general_mat_mul(-1.0, basis, &part, 1.0, columns);
 }
 
 /// Square of the length of what a wake of unit circulation shows, from the products of single vortices.

@@ -2,7 +2,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `detector` | [`WakeDetector`]: the statistic of a scan with given geometry, noise and background; `cells`, `bank`: its velocities and how they are made white, the wakes that are tried |
+//! | `detector` | [`WakeDetector`]: the statistic of a scan with given geometry, noise and background; `bank`: the wakes that are tried |
 //! | `law` | [`EmptyScanLaw`]: thresholds for a rate of false alarms, and the rate of a statistic |
 //! | `spikes` | velocities that stand off their neighbours, to be left out before |
 //! | `power` | [`DetectionTrials`]: share of wakes that are found, the smallest circulation that is |
@@ -11,7 +11,6 @@
 //! an alarm in nearly every empty scan of turbulent air.
 
 mod bank;
-mod cells;
 mod detector;
 mod law;
 mod power;

@@ -48,7 +48,7 @@ impl WakeDetector {
                         places_m.map(|place_m| Vortex::at(place_m, 1.0, 0.05 * spacing_m));
                     places_m
                         .iter()
-                        .all(|at_m| self.cells.hold(&self.model, *at_m))
+                        .all(|at_m| self.filter.cells.hold(&self.filter.model, *at_m))
                         .then(|| Wake::calm(left, right))
                 })
             })

@@ -383,7 +383,7 @@ fn narrow_sectors_of_many_kinds() {
         // a bound above a third of the circulation would excuse a pair that is missed
         assert!(bound < 1.0 / 3.0, "{name}: {bound}");
         assert!(
-            pairs >= 35 && 5 * within_two >= 4 * found,
+            pairs >= 38 && 5 * within_two >= 4 * found,
             "{name}: {pairs}"
         );
         all = [all[0] + found, all[1] + within_two];

@@ -65,8 +65,8 @@ pub(crate) fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
     basis
 }
 
-/// Takes the part of numbers along an orthonormal basis away.
-pub(crate) fn remove(basis: &[Vec<f64>], numbers: &mut [f64]) {
+/// Removes the part along an orthonormal basis from numbers.
+fn remove(basis: &[Vec<f64>], numbers: &mut [f64]) {
     for direction in basis {
         let part = dot(direction, numbers);
         numbers

@@ -7,6 +7,9 @@ use ndarray::{Array2, ArrayView2};
 use crate::error::{Error, finite, increasing, length, positive};
 use crate::vortex_fit::{CorePrior, FreeParameters, PairPrior, Parameter, Top, Wake};
 
+/// Standard deviation of the median of many normal numbers over that of their mean.
+const MEDIAN_OVER_MEAN: f64 = 1.253_314_137_315_500_3;
+
 /// A map of radial velocities, such as accumulation gives.
 #[derive(Debug, Clone, Copy)]
 pub struct VelocityMap<'a> {
@@ -70,8 +73,42 @@ impl VelocityMap<'_> {
         (by_line, by_gate)
     }
 
+    /// Medians over blocks of lines and gates, which outliers do not move; NaN where a block has no velocity.
+    pub(crate) fn block_medians(&self, (by_line, by_gate): (usize, usize)) -> BlockMedians {
+        let elevation_rad = block_means(self.elevation_rad, by_line);
+        let range_m = block_means(self.range_m, by_gate);
+        let mut velocity_m_s = Array2::from_elem((elevation_rad.len(), range_m.len()), f64::NAN);
+        let mut sigma_m_s = Array2::ones(velocity_m_s.raw_dim());
+        for ((block, velocity), sigma) in velocity_m_s.indexed_iter_mut().zip(&mut sigma_m_s) {
+            let known = self.known_in(block, (by_line, by_gate));
+            if known.is_empty() {
+                continue;
+            }
+            let count = known.len() as f64;
+            let mut values: Vec<f64> = known.iter().map(|cell| self.velocity_m_s[*cell]).collect();
+            values.sort_by(f64::total_cmp);
+            *velocity = 0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2]);
+            let deviations = known
+                .iter()
+                .map(|[line, gate]| self.deviation(*line, *gate));
+            let deviation = deviations.sum::<f64>() / count;
+            let wider = if values.len() > 2 {
+                MEDIAN_OVER_MEAN
+            } else {
+                1.0
+            };
+            *sigma = deviation * wider / count.sqrt();
+        }
+        BlockMedians {
+            elevation_rad,
+            range_m,
+            velocity_m_s,
+            sigma_m_s,
+        }
+    }
+
     /// Places of the velocities that there are in a block of so many lines and gates.
-    pub(crate) fn known_in(
+    fn known_in(
         &self,
         (line, gate): (usize, usize),
         (by_line, by_gate): (usize, usize),
@@ -89,6 +126,26 @@ impl VelocityMap<'_> {
         self.standard_deviation_m_s
             .as_ref()
             .map_or(1.0, |d| d[[line, gate]])
+    }
+}
+
+/// A velocity map that owns its data: medians over blocks of another one.
+pub(crate) struct BlockMedians {
+    pub(crate) elevation_rad: Vec<f64>,
+    pub(crate) range_m: Vec<f64>,
+    pub(crate) velocity_m_s: Array2<f64>,
+    /// Standard deviations of the medians if those of the velocities are 1 where none are given.
+    pub(crate) sigma_m_s: Array2<f64>,
+}
+
+impl BlockMedians {
+    pub(crate) fn view(&self) -> VelocityMap<'_> {
+        VelocityMap {
+            elevation_rad: &self.elevation_rad,
+            range_m: &self.range_m,
+            velocity_m_s: self.velocity_m_s.view(),
+            standard_deviation_m_s: Some(self.sigma_m_s.view()),
+        }
     }
 }
 

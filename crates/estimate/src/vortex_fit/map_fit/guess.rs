@@ -8,17 +8,16 @@
 use ndarray::{Array1, Array2};
 
 use crate::error::{Error, enough_velocities};
-use crate::parallel::{map_each, map_indexed};
-use crate::vortex_fit::map_fit::cells::{orthonormal, remove, scaled};
-use crate::vortex_fit::map_fit::data::{block_means, ends, median};
+use crate::matched_filter::{Background, Cells, MatchedFilter};
+use crate::vortex_fit::map_fit::data::ends;
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
 use crate::vortex_fit::top::distinct;
-use crate::vortex_fit::wake::pair::Ray;
-use crate::vortex_fit::wake::range_kernel::LineScratch;
 use crate::vortex_fit::{RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
 
-/// Blocks of the thinned map along each axis, at most.
-const BLOCKS: usize = 48;
+/// Velocities that are searched: medians of blocks stand for more.
+pub(crate) const SEARCHED: usize = 1200;
+/// Points of the weight of a gate are that many times as far apart.
+const COARSER: usize = 4;
 /// Places along each axis.
 const PLACES: usize = 26;
 /// Vortices are no closer \[m\].
@@ -29,47 +28,6 @@ const PAIRS: usize = 3;
 const APART_M: f64 = 12.0;
 /// Velocities that a search needs.
 const NEEDED: usize = 100;
-
-/// The thinned map: one number per block.
-struct Thinned {
-    elevation_rad: Vec<f64>,
-    range_m: Vec<f64>,
-    /// Median velocity \[line, gate\]; 0 without any.
-    velocity: Vec<f64>,
-    /// One over the median standard deviation; 0 where there is no velocity.
-    weight: Vec<f64>,
-}
-
-fn thin(map: &VelocityMap<'_>) -> Thinned {
-    let (by_line, by_gate) = (
-        map.elevation_rad.len().div_ceil(BLOCKS),
-        map.range_m.len().div_ceil(BLOCKS),
-    );
-    let (elevation_rad, range_m) = (
-        block_means(map.elevation_rad, by_line),
-        block_means(map.range_m, by_gate),
-    );
-    let block = |index: usize| {
-        let known = map.known_in(
-            (index / range_m.len(), index % range_m.len()),
-            (by_line, by_gate),
-        );
-        let of = |place: &[usize; 2]| (map.velocity_m_s[*place], map.deviation(place[0], place[1]));
-        let (mut velocities, mut deviations): (Vec<f64>, Vec<f64>) = known.iter().map(of).unzip();
-        if known.is_empty() {
-            (0.0, 0.0)
-        } else {
-            (median(&mut velocities), median(&mut deviations).recip())
-        }
-    };
-    let (velocity, weight) = (0..elevation_rad.len() * range_m.len()).map(block).unzip();
-    Thinned {
-        elevation_rad,
-        range_m,
-        velocity,
-        weight,
-    }
-}
 
 /// A pair of places with the circulations that fit best there.
 #[derive(Debug, Clone, Copy)]
@@ -120,24 +78,19 @@ impl Search {
         kernel: &RangeKernel,
     ) -> Result<Self, Error> {
         enough_velocities(map.validate()?, NEEDED)?;
-        let thinned = thin(map);
-        let weighted = |shape: &[f64]| scaled(&thinned.weight, shape);
-        let basis = orthonormal(&wind_shapes(&thinned, model).map(|shape| weighted(&shape)));
-        let mut data = weighted(&thinned.velocity);
-        remove(&basis, &mut data);
-        let seen = places(&thinned, model, kernel);
-        let rows = map_each(seen.len(), |i| {
-            let mut shape = weighted(&seen[i].1);
-            remove(&basis, &mut shape);
-            shape
-        });
-        let (data, blocks) = (Array1::from_vec(data), thinned.weight.len());
-        let shapes =
-            Array2::from_shape_fn((rows.len(), blocks), |(place, block)| rows[place][block]);
+        let blocks = map.block_medians(map.blocks(SEARCHED));
+        let cells = Cells::new(&blocks.view(), model);
+        let velocities = cells.means(blocks.velocity_m_s.view())?;
+        let background = Background::new(&cells, None)?;
+        let (places_m, core_m) = places(map, model);
+        let kernel = kernel.coarser(COARSER);
+        let (filter, gram) =
+            MatchedFilter::new(model, kernel, cells, background, &places_m, core_m);
+        let white = filter.white(velocities);
         Ok(Self {
-            places_m: seen.iter().map(|(place_m, _)| *place_m).collect(),
-            gram: shapes.dot(&shapes.t()),
-            towards: shapes.dot(&data),
+            places_m,
+            gram,
+            towards: filter.shapes.dot(&white),
         })
     }
 
@@ -213,48 +166,23 @@ impl Search {
     }
 }
 
-/// The grid of places, with what an anticlockwise vortex of unit circulation at each shows on the thinned map.
-fn places(
-    thinned: &Thinned,
-    model: &WakeModel,
-    kernel: &RangeKernel,
-) -> Vec<((f64, f64), Vec<f64>)> {
-    let (first_rad, last_rad) = ends(&thinned.elevation_rad);
-    let (near_m, far_m) = ends(&thinned.range_m);
-    let step = |from: f64, to: f64, i: usize| from + (to - from) * (i as f64 + 0.5) / PLACES as f64;
-    // half the distance of places across the lines: what is between them is not missed
-    let core_m = 0.5 * far_m * (last_rad - first_rad) / PLACES as f64;
-    let kernel = kernel.coarser(4);
-    map_indexed(PLACES * PLACES, LineScratch::default, |scratch, index| {
-        let range_m = step(near_m, far_m, index / PLACES);
-        let place_m = model.position_m(range_m, step(first_rad, last_rad, index % PLACES));
-        let wake = Wake::of_unit_vortex(place_m, core_m.max(1.0));
-        let mut shape = Vec::with_capacity(thinned.velocity.len());
-        for &elevation_rad in &thinned.elevation_rad {
-            let ray = Ray::new(elevation_rad);
-            kernel.apply(
-                (model, &wake, ray),
-                &thinned.range_m,
-                false,
-                scratch,
-                |_, velocity, _| shape.push(velocity),
-            );
-        }
-        (place_m, shape)
-    })
-    .into_iter()
-    .filter(|((_, height_m), _)| !model.images || *height_m > 0.0)
-    .collect()
-}
-
-/// What uniform wind and shear show.
-fn wind_shapes(thinned: &Thinned, model: &WakeModel) -> [Vec<f64>; 2] {
-    let mut shapes = [Vec::new(), Vec::new()];
-    for &elevation_rad in &thinned.elevation_rad {
-        for &range_m in &thinned.range_m {
-            shapes[0].push(elevation_rad.cos());
-            shapes[1].push(model.position_m(range_m, elevation_rad).1 * elevation_rad.cos());
+/// A polar grid of places over a scan, and the core radius of vortices there: half the distance of places across the lines, so that what is between
+/// them is not missed.
+fn places(map: &VelocityMap<'_>, model: &WakeModel) -> (Vec<(f64, f64)>, f64) {
+    let (first_rad, last_rad) = ends(map.elevation_rad);
+    let (near_m, far_m) = ends(map.range_m);
+    let middle =
+        |from: f64, to: f64, i: usize| from + (to - from) * (i as f64 + 0.5) / PLACES as f64;
+    let mut places_m = Vec::new();
+    for i in 0..PLACES {
+        for j in 0..PLACES {
+            let place_m =
+                model.position_m(middle(near_m, far_m, i), middle(first_rad, last_rad, j));
+            if !model.images || place_m.1 > 0.0 {
+                places_m.push(place_m);
+            }
         }
     }
-    shapes
+    let core_m = 0.5 * far_m * (last_rad - first_rad) / PLACES as f64;
+    (places_m, core_m.max(1.0))
 }

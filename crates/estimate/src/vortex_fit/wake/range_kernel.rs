@@ -93,16 +93,21 @@ impl RangeKernel {
         (length_m / self.spacing_m) as usize
     }
 
-    /// The centre of the weights alone, which sees of a linear wind what they see.
-    pub(crate) fn middle(&self) -> Self {
+    /// Distance of the centre of the weights from the range of the gate \[m\].
+    pub(crate) fn mean_offset_m(&self) -> f64 {
         let away = self
             .weights
             .iter()
             .enumerate()
             .map(|(i, w)| i as f64 * self.spacing_m * w)
             .sum::<f64>();
+        self.first_offset_m + away
+    }
+
+    /// The centre of the weights alone, which sees of a linear wind what they see.
+    pub(crate) fn middle(&self) -> Self {
         Self {
-            first_offset_m: self.first_offset_m + away,
+            first_offset_m: self.mean_offset_m(),
             spacing_m: self.spacing_m,
             weights: vec![1.0],
         }

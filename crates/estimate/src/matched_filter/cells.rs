@@ -21,26 +21,26 @@ const MOST_CELLS: usize = 3000;
 
 /// Means over blocks of a map.
 #[derive(Debug, Clone)]
-pub(super) struct Cells {
+pub(crate) struct Cells {
     /// Axes of the thinned map.
-    pub(super) elevation_rad: Vec<f64>,
-    pub(super) range_m: Vec<f64>,
+    pub(crate) elevation_rad: Vec<f64>,
+    pub(crate) range_m: Vec<f64>,
     /// Place (line, gate) on the thinned map, lateral coordinate and height \[m\] and standard deviation \[m/s\] of each cell.
-    pub(super) cells: Vec<Cell>,
+    pub(crate) cells: Vec<Cell>,
     /// Cell of each velocity of the whole map and its weight in the mean; none where nothing was known.
     share: Array2<Option<(usize, f64)>>,
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cell {
-    pub(super) line: usize,
-    pub(super) gate: usize,
-    pub(super) place_m: (f64, f64),
-    pub(super) deviation_m_s: f64,
+pub(crate) struct Cell {
+    pub(crate) line: usize,
+    pub(crate) gate: usize,
+    pub(crate) place_m: (f64, f64),
+    pub(crate) deviation_m_s: f64,
 }
 
 impl Cells {
-    pub(super) fn new(map: &VelocityMap<'_>, model: &WakeModel) -> Self {
+    pub(crate) fn new(map: &VelocityMap<'_>, model: &WakeModel) -> Self {
         let (lines, gates) = (map.elevation_rad.len(), map.range_m.len());
         let (by_line, by_gate) = map.blocks(MOST_CELLS);
         let (elevation_rad, range_m) = (
@@ -80,7 +80,7 @@ impl Cells {
     }
 
     /// Whether a place is in the sector of the map.
-    pub(super) fn hold(&self, model: &WakeModel, place_m: (f64, f64)) -> bool {
+    pub(crate) fn hold(&self, model: &WakeModel, place_m: (f64, f64)) -> bool {
         model.sees((&self.elevation_rad, &self.range_m), place_m)
     }
 
@@ -88,7 +88,7 @@ impl Cells {
     ///
     /// # Errors
     /// [`Error::Length`] for another shape.
-    pub(super) fn means(&self, velocity_m_s: ArrayView2<'_, f64>) -> Result<Vec<f64>, Error> {
+    pub(crate) fn means(&self, velocity_m_s: ArrayView2<'_, f64>) -> Result<Vec<f64>, Error> {
         length(
             "lines of velocity_m_s",
             self.share.nrows(),
@@ -112,7 +112,7 @@ impl Cells {
 
 /// Makes the background of a map white, of unit variance.
 #[derive(Debug, Clone)]
-pub(super) enum Background {
+pub(crate) enum Background {
     /// Independent noise of those standard deviations.
     Noise(Vec<f64>),
     /// With turbulence.
@@ -122,7 +122,7 @@ pub(super) enum Background {
 impl Background {
     /// # Errors
     /// [`Error::OutOfRange`] for an impossible turbulence, [`Error::Linalg`] for a covariance without a factor.
-    pub(super) fn new(cells: &Cells, turbulence: Option<&Turbulence>) -> Result<Self, Error> {
+    pub(crate) fn new(cells: &Cells, turbulence: Option<&Turbulence>) -> Result<Self, Error> {
         let cells = &cells.cells;
         let Some(turbulence) = turbulence else {
             return Ok(Self::Noise(
@@ -148,7 +148,7 @@ impl Background {
     }
 
     /// Columns of numbers by cell, made white in place.
-    pub(super) fn whiten(&self, columns: &mut Array2<f64>) {
+    pub(crate) fn whiten(&self, columns: &mut Array2<f64>) {
         match self {
             Self::Noise(deviations) => {
                 columns
@@ -161,7 +161,7 @@ impl Background {
     }
 
     /// One number by cell, made white in place.
-    pub(super) fn whiten_one(&self, numbers: &mut [f64]) {
+    pub(crate) fn whiten_one(&self, numbers: &mut [f64]) {
         match self {
             Self::Noise(deviations) => numbers
                 .iter_mut()
