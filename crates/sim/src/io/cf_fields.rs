@@ -16,28 +16,27 @@ use wakescope_les::winds::Edges;
 /// What [`VelocityField::check`] finds, or a result too large for one file.
 pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputResult<FileParts> {
     field.check()?;
-    let axis = |values: &[f64]| Data::f64(values.iter().copied());
     let [u, v, w] = &field.velocity_m_s;
     let mut values = vec![
         ("time", Data::f64([field.time_s])),
-        ("z", axis(&field.z_m)),
-        ("y", axis(&field.y_m)),
-        ("x", axis(&field.x_m)),
+        ("z", Data::f64_slice(&field.z_m)),
+        ("y", Data::f64_slice(&field.y_m)),
+        ("x", Data::f64_slice(&field.x_m)),
         ("u", Data::filled(u)),
         ("v", Data::filled(v)),
         ("w", Data::filled(w)),
         ("pressure_m2_s2", Data::filled(&field.pressure_m2_s2)),
     ];
-    values.extend(
-        field
-            .vorticity_per_s
-            .as_ref()
-            .map(|vorticity| ("vorticity_magnitude", Data::filled(vorticity))),
-    );
+    if let Some(vorticity) = &field.vorticity_per_s {
+        values.push(("vorticity_magnitude", Data::filled(vorticity)));
+    }
     // By which readers close a period of cells that are not equal.
-    let edges = |period_m: f64| Data::text(edges::to_text(Edges::Periodic { period_m }));
-    let periods = ["x:edges", "y:edges"].into_iter().zip(field.period_m);
-    values.extend(periods.filter_map(|(name, period_m)| Some((name, edges(period_m?)))));
+    for (name, period_m) in ["x:edges", "y:edges"].into_iter().zip(field.period_m) {
+        if let Some(period_m) = period_m {
+            let text = edges::to_text(Edges::Periodic { period_m });
+            values.push((name, Data::text(text)));
+        }
+    }
     let dims = vec![
         ("time", 1),
         ("z", field.z_m.len()),
@@ -106,10 +105,11 @@ pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> Output
 
 /// The variables of which ranks have the values from number `first` on: those over the planes across z.
 fn shared(mut variables: Vec<Variable>, first: usize) -> Vec<Variable> {
-    variables
-        .iter_mut()
-        .filter(|variable| variable.dims.len() > 2)
-        .for_each(|variable| variable.first = Some(first));
+    for variable in &mut variables {
+        if variable.dims.len() > 2 {
+            variable.first = Some(first);
+        }
+    }
     variables
 }
 

@@ -14,14 +14,13 @@ use super::provenance::Provenance;
 /// What [`CrossPlanes::check`] finds, or a result too large for one file.
 pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     planes.check()?;
-    let axis = |values: &[f64]| Data::f64(values.iter().copied());
     let values = [
-        ("tau", axis(&planes.tau)),
-        ("z", axis(&planes.z_m)),
+        ("tau", Data::f64_slice(&planes.tau)),
+        ("z", Data::f64_slice(&planes.z_m)),
         ("z:edges", Data::text(edges::to_text(planes.z_edges))),
-        ("y", axis(&planes.y_m)),
+        ("y", Data::f64_slice(&planes.y_m)),
         ("y:edges", Data::text(edges::to_text(planes.y_edges))),
-        ("time", axis(&planes.time_s)),
+        ("time", Data::f64_slice(&planes.time_s)),
         ("v", Data::filled(&planes.v_m_s)),
         ("w", Data::filled(&planes.w_m_s)),
     ];

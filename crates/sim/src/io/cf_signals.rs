@@ -24,11 +24,11 @@ pub fn cf_signals_bytes(
     let elevation_rad = repeated(&signals.elevation_rad, records);
     let pulse_time_s = repeated(&signals.pulse_time_s, records);
     let mut values = vec![
-        ("time", Data::f64(signals.time_s.iter().copied())),
+        ("time", Data::f64_slice(&signals.time_s)),
         ("elevation", Data::f64(elevation_rad)),
         ("pulse_time", Data::f64(pulse_time_s)),
         ("current_a", Data::f64(signals.current_a.iter().copied())),
-        ("range", Data::f64(signals.range_m.iter().copied())),
+        ("range", Data::f64_slice(&signals.range_m)),
         ("line_elevation", Data::f64(line_elevation_rad)),
         ("radial_velocity", Data::filled(signals.radial_velocity_m_s)),
     ];

@@ -11,12 +11,11 @@ use crate::measure::recorded::Spectra;
 /// # Errors
 /// A result too large for one file.
 pub fn cf_spectra_bytes(spectra: &Spectra, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-    let axis = |values: &[f64]| Data::f64(values.iter().copied());
     let values = [
-        ("velocity", axis(&spectra.velocity_m_s)),
-        ("range", axis(&spectra.range_m)),
-        ("elevation", axis(&spectra.elevation_rad)),
-        ("time", axis(&spectra.time_s)),
+        ("velocity", Data::f64_slice(&spectra.velocity_m_s)),
+        ("range", Data::f64_slice(&spectra.range_m)),
+        ("elevation", Data::f64_slice(&spectra.elevation_rad)),
+        ("time", Data::f64_slice(&spectra.time_s)),
         ("density", Data::f32(spectra.density.iter().copied())),
     ];
     let dims = vec![

@@ -4,7 +4,7 @@
 //! Check: the tests read the bytes back with an independent reader and hold them to the list that the clients need.
 
 use super::error::{OutputError, OutputResult};
-use super::map::{Field, Unit, VelocityMap};
+use super::map::{Field, Ray, Unit, VelocityMap};
 use super::netcdf::{Data, FILL, Layout, Variable, described};
 use super::provenance::Provenance;
 use super::utc::MAX_TIME_S;
@@ -31,9 +31,8 @@ pub(crate) fn data_bytes(rays: f64, gates: f64) -> f64 {
 
 fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
     map.check()?;
-    let outside = |t: &&f64| t.abs() > MAX_TIME_S;
     let times: Vec<f64> = map.rays.iter().map(|r| r.time_s).collect();
-    if let Some(bad) = times.iter().find(outside) {
+    if let Some(bad) = times.iter().find(|t| t.abs() > MAX_TIME_S) {
         let allowed = format!("within {MAX_TIME_S:?} s of the start of the flow");
         return Err(OutputError::value(
             "ray time_s",
@@ -48,14 +47,12 @@ fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
     values.extend(instrument(map));
     let mut variables = described(include_str!("cfradial.cdl"), values);
     if !map.is_carried() {
-        // A lidar that stands has one place for all rays.
-        let is_place = |variable: &&mut Variable| {
-            ["latitude", "longitude", "altitude"].contains(&&*variable.name)
-        };
-        variables
-            .iter_mut()
-            .filter(is_place)
-            .for_each(|variable| variable.dims.clear());
+        // A lidar that does not move has one position for all rays.
+        for variable in &mut variables {
+            if ["latitude", "longitude", "altitude"].contains(&variable.name.as_str()) {
+                variable.dims.clear();
+            }
+        }
     }
     variables.extend(fields(map, &provenance.scene_toml)?);
     Ok(Layout {
@@ -123,9 +120,12 @@ fn axes(map: &VelocityMap, times: Vec<f64>) -> Values {
     let constant = gates
         .windows(2)
         .all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
-    let degrees = |angle: fn(&super::map::Ray) -> f64| {
-        Data::f32(map.rays.iter().map(|r| angle(r).to_degrees() as f32))
-    };
+    let mut azimuth_deg = Vec::with_capacity(map.rays.len());
+    let mut elevation_deg = Vec::with_capacity(map.rays.len());
+    for ray in &map.rays {
+        azimuth_deg.push(turn(ray.azimuth_rad).to_degrees() as f32);
+        elevation_deg.push(ray.elevation_rad.to_degrees() as f32);
+    }
     vec![
         ("time", Data::f64(times)),
         (
@@ -142,8 +142,8 @@ fn axes(map: &VelocityMap, times: Vec<f64>) -> Values {
             Data::f32([gates[0] as f32]),
         ),
         ("range:meters_between_gates", Data::f32([spacing as f32])),
-        ("azimuth", degrees(|r| turn(r.azimuth_rad))),
-        ("elevation", degrees(|r| r.elevation_rad)),
+        ("azimuth", Data::f32(azimuth_deg)),
+        ("elevation", Data::f32(elevation_deg)),
     ]
 }
 
@@ -153,6 +153,7 @@ pub(crate) const MIRRORED: &str = "mirrored";
 /// Length of a degree of latitude on a sphere with the mean radius of the Earth, m.
 const DEGREE_M: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
 
+/// Latitude, longitude and altitude of the lidar, one for all rays or, of a lidar that moves, one for each with its motion.
 fn site(map: &VelocityMap) -> Values {
     // A scan in one plane without a flight of its own looks across it.
     let across_rad = map
@@ -162,174 +163,173 @@ fn site(map: &VelocityMap) -> Values {
     let heading_rad = map
         .flight
         .map_or(across_rad, |(_, azimuth_rad)| azimuth_rad);
-    // Along the flight and to the right of it, as north and east.
-    let north_east = |x: f64, y: f64| {
-        let (sin, cos) = heading_rad.sin_cos();
-        (x * cos - y * sin, x * sin + y * cos)
-    };
-    let place = |[x_m, y_m, z_m]: [f64; 3]| {
-        let (north_m, east_m) = north_east(x_m, y_m);
-        let width = map.site.latitude_deg.to_radians().cos();
-        let latitude = map.site.latitude_deg;
-        let longitude = map.site.longitude_deg;
-        [
-            latitude + north_m / DEGREE_M,
-            longitude + east_m / (DEGREE_M * width),
-            map.site.altitude_m + z_m,
-        ]
-    };
-    let here_m = [
-        map.flight.map_or(0.0, |(x_m, _)| x_m),
-        map.lidar_y_m,
-        map.lidar_height_m,
-    ];
-    let carrier: Vec<([f64; 3], [f64; 3])> =
-        map.rays.iter().filter_map(|ray| ray.carrier).collect();
-    let places: Vec<[f64; 3]> = match carrier.is_empty() {
-        true => vec![place(here_m)],
-        false => carrier.iter().map(|(place_m, _)| place(*place_m)).collect(),
-    };
-    let values = |d: usize| Data::f64(places.iter().map(|p| p[d]));
-    let mut out = vec![
-        ("latitude", values(0)),
-        ("longitude", values(1)),
-        ("altitude", values(2)),
-    ];
-    if !carrier.is_empty() {
-        // A level carrier that heads along the flight, and drifts where its track does not.
-        let heading_deg = turn(heading_rad).to_degrees();
-        let over_ground = |i: usize| north_east(carrier[i].1[0], carrier[i].1[1]);
-        let drift = |i: usize| {
-            let (north, east) = over_ground(i);
-            let aside_rad = if north == 0.0 && east == 0.0 {
-                0.0
-            } else {
-                east.atan2(north) - heading_rad
-            };
-            aside_rad.sin().atan2(aside_rad.cos()).to_degrees() as f32
-        };
-        let each = |of: &dyn Fn(usize) -> f32| (0..carrier.len()).map(of).collect::<Vec<f32>>();
-        let angles = map
-            .rays
-            .iter()
-            .map(|ray| [ray.azimuth_rad, ray.elevation_rad].map(|rad| rad.to_degrees() as f32));
-        let (rotation, tilt): (Vec<f32>, Vec<f32>) =
-            angles.map(|[az, el]| (az - heading_deg as f32, el)).unzip();
-        let still = || vec![0.0; map.rays.len()];
-        let motion = [
-            ("heading", each(&|_| heading_deg as f32)),
-            ("roll", still()),
-            ("pitch", still()),
-            ("drift", each(&drift)),
-            ("rotation", rotation),
-            ("tilt", tilt),
-            ("eastward_velocity", each(&|i| over_ground(i).1 as f32)),
-            ("northward_velocity", each(&|i| over_ground(i).0 as f32)),
-            ("vertical_velocity", each(&|i| carrier[i].1[2] as f32)),
-        ];
-        out.extend(motion.map(|(name, values)| (name, Data::f32(values))));
+    let carriers = map.rays.iter().filter_map(|ray| ray.carrier);
+    let mut positions_m: Vec<[f64; 3]> = carriers.map(|(position_m, _)| position_m).collect();
+    if positions_m.is_empty() {
+        let x_m = map.flight.map_or(0.0, |(x_m, _)| x_m);
+        positions_m.push([x_m, map.lidar_y_m, map.lidar_height_m]);
     }
-    out
+    let width = map.site.latitude_deg.to_radians().cos();
+    let mut latitude_deg = Vec::with_capacity(positions_m.len());
+    let mut longitude_deg = Vec::with_capacity(positions_m.len());
+    let mut altitude_m = Vec::with_capacity(positions_m.len());
+    for [x_m, y_m, z_m] in positions_m {
+        let (north_m, east_m) = north_east(heading_rad, x_m, y_m);
+        latitude_deg.push(map.site.latitude_deg + north_m / DEGREE_M);
+        longitude_deg.push(map.site.longitude_deg + east_m / (DEGREE_M * width));
+        altitude_m.push(map.site.altitude_m + z_m);
+    }
+    let mut values = vec![
+        ("latitude", Data::f64(latitude_deg)),
+        ("longitude", Data::f64(longitude_deg)),
+        ("altitude", Data::f64(altitude_m)),
+    ];
+    if map.is_carried() {
+        values.extend(carrier_motion(map, heading_rad));
+    }
+    values
+}
+
+/// Components along the flight and to the right of it as components to the north and to the east.
+fn north_east(heading_rad: f64, along: f64, right: f64) -> (f64, f64) {
+    let (sin, cos) = heading_rad.sin_cos();
+    (along * cos - right * sin, along * sin + right * cos)
+}
+
+/// Attitude and velocity of a level carrier that heads along the flight and drifts where its track differs from its heading.
+fn carrier_motion(map: &VelocityMap, heading_rad: f64) -> Values {
+    let heading_deg = turn(heading_rad).to_degrees() as f32;
+    let mut rotation_deg = Vec::new();
+    let mut tilt_deg = Vec::new();
+    let mut drift_deg = Vec::new();
+    let mut eastward_m_s = Vec::new();
+    let mut northward_m_s = Vec::new();
+    let mut vertical_m_s = Vec::new();
+    for ray in &map.rays {
+        rotation_deg.push(ray.azimuth_rad.to_degrees() as f32 - heading_deg);
+        tilt_deg.push(ray.elevation_rad.to_degrees() as f32);
+        let Some((_, velocity_m_s)) = ray.carrier else {
+            continue;
+        };
+        let (north_m_s, east_m_s) = north_east(heading_rad, velocity_m_s[0], velocity_m_s[1]);
+        let drift_rad = if north_m_s == 0.0 && east_m_s == 0.0 {
+            0.0
+        } else {
+            east_m_s.atan2(north_m_s) - heading_rad
+        };
+        drift_deg.push(drift_rad.sin().atan2(drift_rad.cos()).to_degrees() as f32);
+        eastward_m_s.push(east_m_s as f32);
+        northward_m_s.push(north_m_s as f32);
+        vertical_m_s.push(velocity_m_s[2] as f32);
+    }
+    let heading_deg = vec![heading_deg; drift_deg.len()];
+    let level_deg = vec![0.0; map.rays.len()];
+    vec![
+        ("heading", Data::f32(heading_deg)),
+        ("roll", Data::f32(level_deg.clone())),
+        ("pitch", Data::f32(level_deg)),
+        ("drift", Data::f32(drift_deg)),
+        ("rotation", Data::f32(rotation_deg)),
+        ("tilt", Data::f32(tilt_deg)),
+        ("eastward_velocity", Data::f32(eastward_m_s)),
+        ("northward_velocity", Data::f32(northward_m_s)),
+        ("vertical_velocity", Data::f32(vertical_m_s)),
+    ]
 }
 
 fn sweeps(map: &VelocityMap) -> Values {
-    let bounds = map.sweep_bounds();
-    let ints = |values: &mut dyn Iterator<Item = usize>| Data::i32(values.map(|v| v as i32));
-    let floats =
-        |get: fn(&super::map::Sweep) -> f64| Data::f32(map.sweeps.iter().map(|s| get(s) as f32));
-    let is_rhi = map.sweeps.iter().all(|sweep| sweep.mode == SweepMode::Rhi);
-    let fixed = floats(|s| {
-        let angle_rad = if s.mode == SweepMode::Rhi {
-            turn(s.fixed_angle_rad)
-        } else {
-            s.fixed_angle_rad
+    let mut first_rays = Vec::new();
+    let mut last_rays = Vec::new();
+    for (first, last) in map.sweep_bounds() {
+        first_rays.push(first as i32);
+        last_rays.push(last as i32);
+    }
+    let mut fixed_deg = Vec::new();
+    let mut ages = Vec::new();
+    for sweep in &map.sweeps {
+        let angle_rad = match sweep.mode {
+            SweepMode::Rhi => turn(sweep.fixed_angle_rad),
+            _ => sweep.fixed_angle_rad,
         };
-        angle_rad.to_degrees()
-    });
+        fixed_deg.push(angle_rad.to_degrees() as f32);
+        ages.push(sweep.tau as f32);
+    }
+    let is_rhi = map.sweeps.iter().all(|sweep| sweep.mode == SweepMode::Rhi);
     let fixed_name = if is_rhi {
         "azimuth of the scan plane"
     } else {
         "angle that stays during the sweep"
     };
-    let mut out = vec![
+    let mut values = vec![
         ("volume_number", Data::i32([0])),
-        ("sweep_number", ints(&mut (0..bounds.len()))),
-        ("fixed_angle", fixed),
+        ("sweep_number", Data::i32(0..first_rays.len() as i32)),
+        ("fixed_angle", Data::f32(fixed_deg)),
         ("fixed_angle:long_name", Data::text(fixed_name)),
-        (
-            "sweep_start_ray_index",
-            ints(&mut bounds.iter().map(|b| b.0)),
-        ),
-        ("sweep_end_ray_index", ints(&mut bounds.iter().map(|b| b.1))),
+        ("sweep_start_ray_index", Data::i32(first_rays)),
+        ("sweep_end_ray_index", Data::i32(last_rays)),
     ];
-    // Nobody knows the age of a measured wake.
+    // The age of a measured wake is unknown.
     if map.sweeps.iter().all(|sweep| sweep.tau.is_finite()) {
-        out.push(("wake_age", floats(|s| s.tau)));
+        values.push(("wake_age", Data::f32(ages)));
     }
-    out
+    values
 }
 
 fn texts(map: &VelocityMap) -> Values {
-    let start = map.start();
-    let time =
-        |ray: Option<&super::map::Ray>| start.after_s(ray.map_or(0.0, |r| r.time_s)).to_string();
-    let each = |text: &str| Data::text(padded(text).repeat(map.sweeps.len()));
-    let modes: Vec<u8> = map
-        .sweeps
-        .iter()
-        .flat_map(|sweep| padded(sweep.mode.name()))
-        .collect();
+    let sweeps = map.sweeps.len();
+    let mut modes = Vec::new();
+    for sweep in &map.sweeps {
+        modes.extend(padded(sweep.mode.name()));
+    }
+    let platform = if map.is_carried() {
+        "aircraft"
+    } else {
+        "fixed"
+    };
     vec![
+        ("time_coverage_start", date_text(map, map.rays.first())),
+        ("time_coverage_end", date_text(map, map.rays.last())),
         (
-            "time_coverage_start",
-            Data::text(padded(&time(map.rays.first()))),
+            "time_reference",
+            Data::text(padded(&map.start().to_string())),
         ),
-        (
-            "time_coverage_end",
-            Data::text(padded(&time(map.rays.last()))),
-        ),
-        ("time_reference", Data::text(padded(&start.to_string()))),
-        (
-            "platform_type",
-            Data::text(padded(if map.is_carried() {
-                "aircraft"
-            } else {
-                "fixed"
-            })),
-        ),
+        ("platform_type", Data::text(padded(platform))),
         ("instrument_type", Data::text(padded("lidar"))),
         ("primary_axis", Data::text(padded("axis_z"))),
         ("sweep_mode", Data::text(modes)),
-        ("follow_mode", each("none")),
-        ("prt_mode", each("fixed")),
+        ("follow_mode", Data::text(padded("none").repeat(sweeps))),
+        ("prt_mode", Data::text(padded("fixed").repeat(sweeps))),
     ]
+}
+
+/// The date of a ray; that of the start of the flow without one.
+fn date_text(map: &VelocityMap, ray: Option<&Ray>) -> Data {
+    let date = map.start().after_s(ray.map_or(0.0, |r| r.time_s));
+    Data::text(padded(&date.to_string()))
 }
 
 fn instrument(map: &VelocityMap) -> Values {
     let rays = map.rays.len();
     let pulse = &map.pulse;
-    let each = |value: f64| single(&vec![value; rays]);
+    let folding = if pulse.is_mirrored() {
+        MIRRORED
+    } else {
+        "modulo"
+    };
+    let mut samples = Vec::with_capacity(rays);
+    for ray in &map.rays {
+        samples.push(i32::try_from(ray.pulses).unwrap_or(i32::MAX));
+    }
     vec![
         ("frequency", single(&[pulse.frequency_hz])),
-        ("prt", each(pulse.prt_s)),
-        ("pulse_width", each(pulse.pulse_width_s)),
-        ("nyquist_velocity", each(pulse.nyquist_velocity_m_s)),
+        ("prt", single(&vec![pulse.prt_s; rays])),
+        ("pulse_width", single(&vec![pulse.pulse_width_s; rays])),
         (
-            "nyquist_velocity:folding",
-            Data::text(if pulse.is_mirrored() {
-                MIRRORED
-            } else {
-                "modulo"
-            }),
+            "nyquist_velocity",
+            single(&vec![pulse.nyquist_velocity_m_s; rays]),
         ),
-        (
-            "n_samples",
-            Data::i32(
-                map.rays
-                    .iter()
-                    .map(|ray| i32::try_from(ray.pulses).unwrap_or(i32::MAX)),
-            ),
-        ),
+        ("nyquist_velocity:folding", Data::text(folding)),
+        ("n_samples", Data::i32(samples)),
         ("antenna_transition", Data::i8(vec![0; rays])),
     ]
 }
@@ -337,16 +337,16 @@ fn instrument(map: &VelocityMap) -> Values {
 /// The estimates keep the scene too: xradar writes no global attributes but its own, and what a map means for a wake is in the scene; and
 /// the part of it that says how they were estimated, for those who drop it.
 fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
-    let variable = |field: &Field| {
-        let out = field_variable(field);
-        match field.name.as_str() {
-            "radial_velocity" => out
+    let mut out = Vec::with_capacity(map.fields.len() + 1);
+    for field in &map.fields {
+        let variable = field_variable(field);
+        out.push(match field.name.as_str() {
+            "radial_velocity" => variable
                 .text("scene", scene_toml)
-                .text("instrument", &instrument_of(scene_toml)),
-            _ => out,
-        }
-    };
-    let mut out: Vec<Variable> = map.fields.iter().map(variable).collect();
+                .text("instrument", &instrument_tables(scene_toml)),
+            _ => variable,
+        });
+    }
     if map.field("radial_velocity").is_none() {
         let source = ["v_gate", "v_pulse", "v_exact"]
             .iter()
@@ -371,7 +371,7 @@ fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
 }
 
 /// The tables of a scene that say how velocities were estimated, whatever the air did.
-fn instrument_of(scene_toml: &str) -> String {
+fn instrument_tables(scene_toml: &str) -> String {
     let mut scene: toml::Table = scene_toml.parse().unwrap_or_default();
     scene.retain(|key, _| {
         [
@@ -403,11 +403,10 @@ fn field_variable(field: &Field) -> Variable {
             Some(field.ancillary.as_str()).filter(|names| !names.is_empty()),
         ),
     ];
-    for (name, text) in further
-        .into_iter()
-        .filter_map(|(name, text)| Some((name, text?)))
-    {
-        out = out.text(name, text);
+    for (name, text) in further {
+        if let Some(text) = text {
+            out = out.text(name, text);
+        }
     }
     out.attr("_FillValue", Data::f32([FILL]))
 }

@@ -241,37 +241,33 @@ impl VelocityMap {
     /// The sweeps of one kind alone.
     #[must_use]
     pub fn of_mode(&self, mode: SweepMode) -> Self {
-        let is_of = |ray: &usize| {
-            self.sweeps
-                .get(self.rays[*ray].sweep)
-                .is_some_and(|sweep| sweep.mode == mode)
-        };
-        let rays: Vec<usize> = (0..self.rays.len()).filter(is_of).collect();
-        let before = |sweep: usize| {
-            self.sweeps[..sweep]
-                .iter()
-                .filter(|s| s.mode == mode)
-                .count()
-        };
-        let field = |field: &Field| Field {
-            values: field.values.select(Axis(0), &rays),
-            ..field.clone()
-        };
+        let mut sweeps = Vec::new();
+        let mut number_of_sweep = Vec::with_capacity(self.sweeps.len());
+        for sweep in &self.sweeps {
+            number_of_sweep.push((sweep.mode == mode).then_some(sweeps.len()));
+            if sweep.mode == mode {
+                sweeps.push(*sweep);
+            }
+        }
+        let mut indices = Vec::new();
+        let mut rays = Vec::new();
+        for (index, ray) in self.rays.iter().enumerate() {
+            if let Some(Some(sweep)) = number_of_sweep.get(ray.sweep).copied() {
+                indices.push(index);
+                rays.push(Ray { sweep, ..*ray });
+            }
+        }
+        let mut fields = Vec::with_capacity(self.fields.len());
+        for field in &self.fields {
+            fields.push(Field {
+                values: field.values.select(Axis(0), &indices),
+                ..field.clone()
+            });
+        }
         Self {
-            rays: rays
-                .iter()
-                .map(|&ray| Ray {
-                    sweep: before(self.rays[ray].sweep),
-                    ..self.rays[ray]
-                })
-                .collect(),
-            sweeps: self
-                .sweeps
-                .iter()
-                .copied()
-                .filter(|sweep| sweep.mode == mode)
-                .collect(),
-            fields: self.fields.iter().map(field).collect(),
+            rays,
+            sweeps,
+            fields,
             ..self.clone()
         }
     }
@@ -288,15 +284,13 @@ impl VelocityMap {
 
     /// First and last (inclusive) ray of each sweep: of all rays that follow each other in it.
     pub fn sweep_bounds(&self) -> Vec<(usize, usize)> {
+        let mut bounds = Vec::new();
         let mut next = 0;
-        let bounds = |rays: &[Ray]| {
+        for rays in self.rays.chunk_by(|a, b| a.sweep == b.sweep) {
+            bounds.push((next, next + rays.len() - 1));
             next += rays.len();
-            (next - rays.len(), next - 1)
-        };
-        self.rays
-            .chunk_by(|a, b| a.sweep == b.sweep)
-            .map(bounds)
-            .collect()
+        }
+        bounds
     }
 
     /// Checks shapes, order and values.
@@ -329,17 +323,14 @@ impl VelocityMap {
     }
 
     fn check_rays(&self) -> OutputResult<()> {
-        let is_known = |ray: &Ray| ray.elevation_rad.is_finite() && ray.azimuth_rad.is_finite();
-        if let Some(i) = self.rays.iter().position(|ray| !is_known(ray)) {
-            let pair = format!(
-                "{}, {}",
-                self.rays[i].elevation_rad, self.rays[i].azimuth_rad
-            );
-            return Err(OutputError::value(
-                format!("ray {i} angles"),
-                pair,
-                "must be finite",
-            ));
+        for (i, ray) in self.rays.iter().enumerate() {
+            if !(ray.elevation_rad.is_finite() && ray.azimuth_rad.is_finite()) {
+                return Err(OutputError::value(
+                    format!("ray {i} angles"),
+                    format!("{}, {}", ray.elevation_rad, ray.azimuth_rad),
+                    "must be finite",
+                ));
+            }
         }
         let bounds = self.sweep_bounds();
         for (expected, (first, _)) in bounds.iter().enumerate() {

@@ -61,6 +61,11 @@ impl Data {
         Self::new(6, values.into_iter().map(f64::to_be_bytes))
     }
 
+    /// The floats of a slice, such as an axis.
+    pub(crate) fn f64_slice(values: &[f64]) -> Self {
+        Self::f64(values.iter().copied())
+    }
+
     /// 32-bit floats with [`FILL`] for NaN.
     pub(crate) fn filled<'a>(values: impl IntoIterator<Item = &'a f64>) -> Self {
         Self::f32(

@@ -53,7 +53,7 @@ impl NumberType {
     }
 
     /// By its name in numpy, which counts bytes: `i2`.
-    pub(crate) fn of_numpy(name: &str) -> Option<Self> {
+    pub(crate) fn from_numpy(name: &str) -> Option<Self> {
         let (kind, bytes) = name.split_at_checked(1)?;
         Self::named(&format!(
             "{kind}{}",
@@ -133,13 +133,13 @@ mod tests {
         }
         let zeros = ["u8", "u16", "i16", "f32", "u64"].map(|name| named(name).zero());
         assert_eq!(zeros, [128.0, 32_768.0, 0.0, 0.0, 0.0]);
-        assert_eq!(NumberType::of_numpy("i2"), NumberType::named("i16"));
+        assert_eq!(NumberType::from_numpy("i2"), NumberType::named("i16"));
         assert_eq!(
-            (NumberType::of_numpy("i8"), named("i8").bytes),
+            (NumberType::from_numpy("i8"), named("i8").bytes),
             (NumberType::named("i64"), 1)
         );
         assert_eq!(
-            ["f2", "f99", "\u{e9}4", ""].map(NumberType::of_numpy),
+            ["f2", "f99", "\u{e9}4", ""].map(NumberType::from_numpy),
             [None; 4]
         );
     }

@@ -63,11 +63,9 @@ impl ArrayInFile {
                     sample as u64 * self.records as u64 + records.start as u64,
                     records.len(),
                 )?;
-                out.iter_mut()
-                    .skip(place)
-                    .step_by(count)
-                    .zip(row)
-                    .for_each(|(out, sample)| *out = sample);
+                for (record, value) in row.into_iter().enumerate() {
+                    out[record * count + place] = value;
+                }
             }
             return Ok(out);
         }
@@ -99,19 +97,17 @@ impl ArrayInFile {
         self.file
             .seek(SeekFrom::Start(stored.begin + first * size))?;
         self.file.read_exact(&mut raw)?;
-        let number = |bytes: &[u8]| stored.number.value(bytes, stored.byte_order);
-        let sample = |bytes: &[u8]| {
+        let mut samples = Vec::with_capacity(count);
+        for bytes in raw.chunks_exact(size as usize) {
             let (first, second) = bytes.split_at(stored.number.bytes as usize);
-            Complex::new(
-                number(first),
-                if stored.is_complex {
-                    number(second)
-                } else {
-                    0.0
-                },
-            )
-        };
-        Ok(raw.chunks_exact(size as usize).map(sample).collect())
+            let re = stored.number.value(first, stored.byte_order);
+            let im = match stored.is_complex {
+                true => stored.number.value(second, stored.byte_order),
+                false => 0.0,
+            };
+            samples.push(Complex::new(re, im));
+        }
+        Ok(samples)
     }
 }
 

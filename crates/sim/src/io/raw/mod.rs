@@ -160,7 +160,7 @@ impl RawRecords {
     /// Opens a file; only its header is read.
     ///
     /// # Errors
-    /// A file that cannot be read, is damaged, has another shape than its header says or needs words that `format` lacks; an option
+    /// A file that cannot be read, is damaged, has another shape than its header says or needs options that `format` lacks; an option
     /// of `format` that has no effect on a file of its kind.
     pub fn open(
         path: &Path,
@@ -168,12 +168,10 @@ impl RawRecords {
         samples: usize,
         pulses_per_line: usize,
     ) -> Result<Self, Error> {
-        let refuse = |reason: String| Error::Input {
-            path: path.to_owned(),
-            reason,
-        };
         let (mut file, length, magic) = text_file::begin(path)?;
-        format.refuse_unused(&magic).map_err(refuse)?;
+        format
+            .refuse_unused(&magic)
+            .map_err(|reason| Error::input(path, reason))?;
         let numbers = Numbers {
             path,
             format,
@@ -189,24 +187,26 @@ impl RawRecords {
             }
             [0x93, b'N', b'U', b'M', ..] => StoredArray::read(&mut file, 0, length)
                 .and_then(|array| numbers.records(file, array)),
-            [b'P', b'K', 3, 4, ..] => numbers.of_archive(file, length),
+            [b'P', b'K', 3, 4, ..] => numbers.archive(file, length),
             _ => Err(
                 "it is neither NetCDF, NPY nor NPZ; --format names the numbers of a binary file, \
                  e.g. --format i16 --byte-order little"
                     .into(),
             ),
         };
-        let found = found.map_err(refuse)?.not_empty()?;
+        let found = found
+            .map_err(|reason| Error::input(path, reason))?
+            .not_empty()?;
         if format.complex && format.number.is_none() {
             let without = RawFormat {
                 complex: false,
                 ..format.clone()
             };
-            if Self::open(path, &without, samples, pulses_per_line)?.is_complex == found.is_complex
-            {
-                return Err(refuse(
-                    "--complex has no effect: its last index does not run over pairs of numbers"
-                        .into(),
+            let real = Self::open(path, &without, samples, pulses_per_line)?;
+            if real.is_complex == found.is_complex {
+                return Err(Error::input(
+                    path,
+                    "--complex has no effect: its last index does not run over pairs of numbers",
                 ));
             }
         }
@@ -261,10 +261,7 @@ impl RawRecords {
 
     /// An error of this file.
     pub fn refuse(&self, reason: String) -> Error {
-        Error::Input {
-            path: self.path.clone(),
-            reason,
-        }
+        Error::input(&self.path, reason)
     }
 
     /// The samples of some records, one record after the other; the second parts of real samples are 0. A missing sample has a
@@ -291,22 +288,12 @@ impl RawRecords {
             .source
             .read(records, samples)
             .map_err(|reason| self.refuse(reason))?;
-        let number = |stored: f64| {
-            if self.fills.contains(&stored) {
-                f64::NAN
-            } else {
-                (stored - self.zero) * self.scale
-            }
-        };
         for sample in &mut found {
-            *sample = Complex::new(
-                number(sample.re),
-                if self.is_complex {
-                    number(sample.im)
-                } else {
-                    0.0
-                },
-            );
+            let im = match self.is_complex {
+                true => self.scaled(sample.im),
+                false => 0.0,
+            };
+            *sample = Complex::new(self.scaled(sample.re), im);
             if sample.re.abs().max(sample.im.abs()) >= self.outsized {
                 sample.re = f64::NAN;
             }
@@ -317,6 +304,15 @@ impl RawRecords {
             }
         }
         Ok(found)
+    }
+
+    /// What a stored number stands for; NaN of a missing one.
+    fn scaled(&self, stored: f64) -> f64 {
+        if self.fills.contains(&stored) {
+            f64::NAN
+        } else {
+            (stored - self.zero) * self.scale
+        }
     }
 
     /// Reverses the spectrum of consecutive samples of a record: the conjugate of complex samples;
@@ -330,6 +326,20 @@ impl RawRecords {
             }
         }
     }
+}
+
+/// The first array of an archive that has one of these names.
+fn named_array<'a>(
+    arrays: &'a [(String, StoredArray)],
+    names: &[&str],
+) -> Option<&'a (String, StoredArray)> {
+    arrays
+        .iter()
+        .find(|(name, _)| names.contains(&name.as_str()))
+}
+
+fn duplicate(file: &File) -> Result<File, String> {
+    file.try_clone().map_err(|e| e.to_string())
 }
 
 /// A file of numbers that stand as a format and a scene say, as far as it does not say it.
@@ -442,51 +452,52 @@ impl Numbers<'_> {
         })
     }
 
-    fn of_archive(self, mut file: File, length: u64) -> Result<RawRecords, String> {
+    /// The records of an archive, with the elevations and times that are in it.
+    fn archive(self, mut file: File, length: u64) -> Result<RawRecords, String> {
         let arrays = numpy::archive(&mut file, length)?;
-        let named = |names: &[&str]| {
-            arrays
-                .iter()
-                .find(|(name, _)| names.contains(&name.as_str()))
-        };
         let mut large = arrays.iter().filter(|(_, array)| array.shape.len() > 1);
         let chosen = match (&self.format.variable, large.next(), large.next()) {
-            (Some(name), ..) => named(&[name]),
+            (Some(name), ..) => named_array(&arrays, &[name]),
             (None, Some(one), None) => Some(one),
-            (None, ..) => named(&["signals", "current_a"]),
+            (None, ..) => named_array(&arrays, &["signals", "current_a"]),
         };
         let (_, signals) = chosen.ok_or(
             "it has several arrays, or none: --variable names the one that holds the samples",
         )?;
-        let records_of = |array: &StoredArray, format: &RawFormat| {
-            Numbers { format, ..self }
-                .records(file.try_clone().map_err(|e| e.to_string())?, array.clone())
-        };
-        let mut signals = records_of(signals, self.format)?;
+        let mut signals = self.records(duplicate(&file)?, signals.clone())?;
         let records = signals.records;
-        let values = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
-            let Some((name, array)) = named(&names) else {
-                return Ok(None);
-            };
-            let count = array
-                .shape
-                .iter()
-                .try_fold(1_u64, |n, length| n.checked_mul(*length))
-                .unwrap_or(u64::MAX);
-            if count != records as u64 {
-                return Err(format!(
-                    "{name} has {count} values; one for each of the {records} records is needed"
-                ));
-            }
-            // The numbers of the array, both parts of them, and what is made of them.
-            machine::holds(name, 40.0 * records as f64)?;
-            // A row of numbers is one record.
-            let mut array = records_of(array, &RawFormat::default())?;
-            let read = array.source.read(0..array.records, 0..array.samples)?;
-            Ok(Some(read.into_iter().map(|value| value.re).collect()))
-        };
-        signals.about.elevation_rad = values(["elevation_rad", "elevation"])?;
-        signals.about.time_s = values(["time_s", "pulse_time"])?;
+        let elevation = named_array(&arrays, &["elevation_rad", "elevation"]);
+        let time = named_array(&arrays, &["time_s", "pulse_time"]);
+        signals.about.elevation_rad = self.values(&file, elevation, records)?;
+        signals.about.time_s = self.values(&file, time, records)?;
         Ok(signals)
+    }
+
+    /// The numbers of an array of an archive, one for each record.
+    fn values(
+        self,
+        file: &File,
+        array: Option<&(String, StoredArray)>,
+        records: usize,
+    ) -> Result<Option<Vec<f64>>, String> {
+        let Some((name, array)) = array else {
+            return Ok(None);
+        };
+        let mut lengths = array.shape.iter();
+        let count = lengths.try_fold(1_u64, |count, length| count.checked_mul(*length));
+        let count = count.unwrap_or(u64::MAX);
+        if count != records as u64 {
+            return Err(format!(
+                "{name} has {count} values; one for each of the {records} records is needed"
+            ));
+        }
+        // The numbers of the array, both parts of them, and what is made of them.
+        machine::holds(name, 40.0 * records as f64)?;
+        // A row of numbers is one record.
+        let format = &RawFormat::default();
+        let numbers = Numbers { format, ..self };
+        let mut array = numbers.records(duplicate(file)?, array.clone())?;
+        let read = array.source.read(0..array.records, 0..array.samples)?;
+        Ok(Some(read.into_iter().map(|value| value.re).collect()))
     }
 }

@@ -48,44 +48,22 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
     let mut lengths = file
         .shape(&name)
         .ok_or_else(|| format!("it has no variable {name}"))?;
-    let of_current =
-        || (name == "current_a" && file.has("quadrature_a")).then(|| "quadrature_a".to_owned());
-    let second = format.quadrature.clone().or_else(of_current);
-    if let Some(second) = second
-        .as_ref()
-        .filter(|second| file.shape(second).as_ref() != Some(&lengths))
-    {
-        return Err(format!(
-            "variable {second} has not the dimensions of {name}"
-        ));
-    }
+    let second = second_quadrature(file, format, &name, &lengths)?;
     let are_pairs = second.is_none() && format.complex && lengths.last() == Some(&2);
     if are_pairs {
         lengths.pop();
     }
-    let (Some(samples), true) = (lengths.pop(), lengths.iter().all(|length| *length > 0)) else {
+    let samples = lengths.pop();
+    let has_records = lengths.iter().all(|length| *length > 0);
+    let Some(samples) = samples.filter(|_| has_records) else {
         return Err(format!(
             "variable {name} has no dimension: records with samples are needed"
         ));
     };
-    let number = |attribute: &str| file.number(&name, attribute);
-    let scale = number("scale_factor").unwrap_or(1.0);
-    let (bits, is_unsigned) = match file.kind(&name) {
-        Some(NcType::Float | NcType::Double) => (0, false),
-        Some(NcType::Byte) => (8, false),
-        Some(NcType::UByte) => (8, true),
-        Some(NcType::Short) => (16, false),
-        Some(NcType::UShort) => (16, true),
-        Some(NcType::UInt) => (32, true),
-        _ => (32, false),
-    };
-    let are_integers = bits > 0;
-    let is_unsigned = match file.text(&name, "_Unsigned") {
-        Some(text) => are_integers && text.eq_ignore_ascii_case("true"),
-        None => is_unsigned,
-    };
+    let scale = file.number(&name, "scale_factor").unwrap_or(1.0);
+    let (bits, is_unsigned) = integer_kind(file, &name);
     // An offset says itself which code is zero.
-    let zero = match is_unsigned && number("add_offset").is_none() {
+    let zero = match is_unsigned && file.number(&name, "add_offset").is_none() {
         true => scale * middle_code(bits),
         false => 0.0,
     };
@@ -103,8 +81,45 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
         packed_scale: scale,
         zero,
         about,
-        ..RawRecords::new(path, source, shape, is_complex, are_integers)
+        ..RawRecords::new(path, source, shape, is_complex, bits > 0)
     })
+}
+
+/// The variable of the second quadrature, if there is one.
+fn second_quadrature(
+    file: &NetcdfFile,
+    format: &RawFormat,
+    name: &str,
+    lengths: &[u64],
+) -> Result<Option<String>, String> {
+    let second = match &format.quadrature {
+        Some(second) => second.clone(),
+        None if name == "current_a" && file.has("quadrature_a") => "quadrature_a".to_owned(),
+        None => return Ok(None),
+    };
+    match file.shape(&second).as_deref() == Some(lengths) {
+        true => Ok(Some(second)),
+        false => Err(format!(
+            "variable {second} has not the dimensions of {name}"
+        )),
+    }
+}
+
+/// Bits of the integers of a variable, and whether they have no sign; 0 bits for floats.
+fn integer_kind(file: &NetcdfFile, name: &str) -> (i32, bool) {
+    let (bits, is_unsigned) = match file.kind(name) {
+        Some(NcType::Float | NcType::Double) => (0, false),
+        Some(NcType::Byte) => (8, false),
+        Some(NcType::UByte) => (8, true),
+        Some(NcType::Short) => (16, false),
+        Some(NcType::UShort) => (16, true),
+        Some(NcType::UInt) => (32, true),
+        _ => (32, false),
+    };
+    match file.text(name, "_Unsigned") {
+        Some(text) => (bits, bits > 0 && text.eq_ignore_ascii_case("true")),
+        None => (bits, is_unsigned),
+    }
 }
 
 impl RecordSource for NetcdfRecords {
@@ -178,23 +193,30 @@ fn about(file: &NetcdfFile, records: usize) -> Result<About, String> {
         scene_toml: file.global_text("scene").map(str::to_owned),
         ..About::default()
     };
-    // A coordinate of the samples, such as time, is none of the records.
-    let of_records = |values: Vec<f64>| Some(values).filter(|values| values.len() == records);
-    let elevations = variable::elevations_rad(file)?;
-    about.elevation_rad = elevations.and_then(|(_, elevation_rad)| of_records(elevation_rad));
-    let first = |names: [&'static str; 2]| names.into_iter().find(|name| file.has(name));
-    if let Some(name) = first(["pulse_time", "ray_time"]) {
-        about.time_s = of_records(file.seconds(name)?);
+    if let Some((_, elevation_rad)) = variable::elevations_rad(file)? {
+        about.elevation_rad = one_for_each(elevation_rad, records);
     }
-    if let Some(name) = first(["ray_line", "line"]) {
-        about.line = of_records(file.floats(name)?);
+    if let Some(name) = first_variable(file, ["pulse_time", "ray_time"]) {
+        about.time_s = one_for_each(file.seconds(name)?, records);
+    }
+    if let Some(name) = first_variable(file, ["ray_line", "line"]) {
+        about.line = one_for_each(file.floats(name)?, records);
     }
     for name in CONSTANTS.split(' ').filter(|name| file.has(name)) {
-        about
-            .constants
-            .extend(file.floats(name)?.first().map(|value| (name, *value)));
+        if let Some(value) = file.floats(name)?.first() {
+            about.constants.insert(name, *value);
+        }
     }
     Ok(about)
+}
+
+/// Values of the records; none for a coordinate of the samples, such as time.
+fn one_for_each(values: Vec<f64>, records: usize) -> Option<Vec<f64>> {
+    (values.len() == records).then_some(values)
+}
+
+fn first_variable(file: &NetcdfFile, names: [&'static str; 2]) -> Option<&'static str> {
+    names.into_iter().find(|name| file.has(name))
 }
 
 #[cfg(test)]

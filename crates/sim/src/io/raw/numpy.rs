@@ -51,7 +51,7 @@ impl StoredArray {
             _ => return Err(NO_ARRAY.into()),
         };
         let text = bytes.get(head..head + length as usize).ok_or(NO_ARRAY)?;
-        let found = Self::of_text(
+        let found = Self::from_header(
             &String::from_utf8_lossy(text),
             at + head as u64 + u64::from(length),
         )?;
@@ -73,21 +73,16 @@ impl StoredArray {
         }
     }
 
-    fn of_text(text: &str, begin: u64) -> Result<Self, String> {
-        let after = |key: &str| Some(text.split_once(&format!("'{key}':"))?.1.trim_start());
-        let kind = after("descr")
+    fn from_header(text: &str, begin: u64) -> Result<Self, String> {
+        let kind = entry(text, "descr")
             .and_then(|rest| rest.strip_prefix('\'')?.split('\'').next())
             .ok_or(NO_ARRAY)?;
-        let fortran_order = after("fortran_order").ok_or(NO_ARRAY)?.starts_with("True");
-        let shape = after("shape")
+        let fortran_order = entry(text, "fortran_order")
+            .ok_or(NO_ARRAY)?
+            .starts_with("True");
+        let lengths = entry(text, "shape")
             .and_then(|rest| rest.strip_prefix('(')?.split(')').next())
             .ok_or(NO_ARRAY)?;
-        let shape: Option<Vec<u64>> = shape
-            .split(',')
-            .map(str::trim)
-            .filter(|n| !n.is_empty())
-            .map(|n| n.parse().ok())
-            .collect();
         // A sign of the byte order, then the kind; bytes that are no text may be several to a sign.
         let mut signs = kind.chars();
         let order = signs.next();
@@ -95,7 +90,7 @@ impl StoredArray {
         let (number, is_complex) = match name {
             "c8" => (Some(NumberType::F32), true),
             "c16" => (Some(NumberType::F64), true),
-            name => (NumberType::of_numpy(name), false),
+            name => (NumberType::from_numpy(name), false),
         };
         let byte_order = if order == Some('>') {
             ByteOrder::Big
@@ -108,26 +103,37 @@ impl StoredArray {
                  numpy's astype(\"f4\") makes them"
             )
         })?;
+        let mut shape = Vec::new();
+        for length in lengths.split(',').map(str::trim) {
+            if !length.is_empty() {
+                shape.push(length.parse().map_err(|_| NO_ARRAY)?);
+            }
+        }
         Ok(Self {
             number,
             byte_order,
             is_complex,
             fortran_order,
-            shape: shape.ok_or(NO_ARRAY)?,
+            shape,
             begin,
         })
     }
+}
+
+/// What follows a key of a header.
+fn entry<'t>(text: &'t str, key: &str) -> Option<&'t str> {
+    let (_, rest) = text.split_once(&format!("'{key}':"))?;
+    Some(rest.trim_start())
 }
 
 /// The arrays of an archive, by name.
 pub(super) fn archive(file: &mut File, length: u64) -> Result<Vec<(String, StoredArray)>, String> {
     let own = file.try_clone().map_err(|e| e.to_string())?;
     let [mut tail, mut table] = [(); 2].map(|()| vec![0; RECOMMENDED_BUFFER_SIZE]);
-    let damaged = |_: rawzip::Error| NO_ARCHIVE;
-    let archive = ZipArchive::from_file(own, &mut tail).map_err(damaged)?;
+    let archive = ZipArchive::from_file(own, &mut tail).map_err(|_| NO_ARCHIVE)?;
     let mut entries = archive.entries(&mut table);
     let mut found = Vec::new();
-    while let Some(entry) = entries.next_entry().map_err(damaged)? {
+    while let Some(entry) = entries.next_entry().map_err(|_| NO_ARCHIVE)? {
         let name = String::from_utf8_lossy(entry.file_path().as_bytes()).into_owned();
         let Some(name) = name.strip_suffix(".npy") else {
             continue;
@@ -139,7 +145,7 @@ pub(super) fn archive(file: &mut File, length: u64) -> Result<Vec<(String, Store
         }
         let (begin, end) = archive
             .get_entry(entry.wayfinder())
-            .map_err(damaged)?
+            .map_err(|_| NO_ARCHIVE)?
             .compressed_data_range();
         if end > length {
             return Err(NO_ARCHIVE.into());

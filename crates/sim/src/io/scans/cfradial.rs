@@ -10,7 +10,7 @@ use crate::io::netcdf_input::NetcdfFile;
 use crate::io::units::Quantity;
 use crate::io::variable::{
     self, AZIMUTH, ELEVATION, NYQUIST, PULSE_WIDTH, RANGE, RATIO, SIGMA, TOWARDS, TRANSITION,
-    Times, VELOCITY, ZENITH,
+    Times, VELOCITY, VariableNames, ZENITH,
 };
 use crate::io::{UtcTime, cfradial::MIRRORED};
 use crate::machine;
@@ -33,11 +33,10 @@ pub(super) fn scans(
     let rays = Rays::read(file, format, &velocity, range_m.len())?;
     let pulse_width_s = pulse_width(file)?;
     let place_deg = place(file)?;
-    let of_field = |name| file.text(&velocity.name, name);
     let scene_toml = file
         .global_text("scene")
-        .or_else(|| of_field("scene"))
-        .or_else(|| of_field("instrument"));
+        .or_else(|| file.text(&velocity.name, "scene"))
+        .or_else(|| file.text(&velocity.name, "instrument"));
     let is_own = file
         .global_text("source")
         .is_some_and(|source| source.starts_with("wakescope "));
@@ -54,15 +53,15 @@ pub(super) fn scans(
             let (scans, skipped) = match planes::in_order(rows) {
                 Ok(split) => split,
                 Err(reason) => {
-                    found.left_out.push(format!("{what}: {reason}"));
+                    found.skipped.push(format!("{what}: {reason}"));
                     continue;
                 }
             };
             let skipped = skipped.iter().map(|text| format!("{what}: {text}"));
-            found.left_out.extend(skipped);
+            found.skipped.extend(skipped);
             for scan in scans {
                 match scan_map(scan.rays, range_m.clone(), fold_m_s, &what) {
-                    Err(reason) => found.left_out.push(reason),
+                    Err(reason) => found.skipped.push(reason),
                     Ok(map) => found.scans.push(ReadScan {
                         azimuth_rad: scan.azimuth_rad,
                         place_deg,
@@ -112,16 +111,9 @@ impl Rays {
             variable::elevations_rad(file)?.ok_or("it has no variable elevation")?;
         let count = elevation_rad.len();
         let sweeps = sweeps(file, count)?;
-        let of_rays = |known, quantity| match variable::find(file, known) {
-            Some(name) => {
-                let values = variable::values(file, name, quantity)?;
-                variable::of_rays(name, values, count, &sweeps).map(Some)
-            }
-            None => Ok::<_, String>(None),
-        };
-        let azimuth_rad =
-            of_rays(&AZIMUTH, Quantity::Angle)?.ok_or("it has no variable azimuth")?;
-        let nyquist_m_s = of_rays(&NYQUIST, Quantity::Velocity)?;
+        let azimuth_rad = ray_values(file, &AZIMUTH, Quantity::Angle, count, &sweeps)?
+            .ok_or("it has no variable azimuth")?;
+        let nyquist_m_s = ray_values(file, &NYQUIST, Quantity::Velocity, count, &sweeps)?;
         let moving = match variable::find(file, &TRANSITION) {
             Some(name) => Some(variable::of_rays(name, file.floats(name)?, count, &sweeps)?),
             None => None,
@@ -129,23 +121,29 @@ impl Rays {
         let times = times(file, count)?;
         let layout = GateLayout::new(file, &velocity.name, count, gates)?;
         let cells = Cells::read(file, format, velocity, &layout)?;
-        let row = |ray: usize| RayRow {
-            elevation_rad: elevation_rad[ray],
-            azimuth_rad: azimuth_rad[ray],
-            time_s: times.time_s[ray],
-            ..cells.row(ray * gates..(ray + 1) * gates)
-        };
-        let is_still = |ray: usize| moving.as_ref().is_none_or(|moves| moves[ray] != 1.0);
         // Mirrored velocities are no multiple away from those of the air.
         let is_mirrored = variable::find(file, &NYQUIST)
             .and_then(|name| file.text(name, "folding"))
             .is_some_and(|folding| folding == MIRRORED);
-        let fold_m_s = nyquist_m_s.filter(|_| !is_mirrored).unwrap_or_default();
-        let fold = |ray: usize| fold_m_s.get(ray).map_or(f64::NAN, |nyquist| 2.0 * nyquist);
+        let nyquist_m_s = nyquist_m_s.filter(|_| !is_mirrored);
+        let mut rows = Vec::with_capacity(count);
+        let mut is_still = Vec::with_capacity(count);
+        let mut fold_m_s = Vec::with_capacity(count);
+        for ray in 0..count {
+            rows.push(RayRow {
+                elevation_rad: elevation_rad[ray],
+                azimuth_rad: azimuth_rad[ray],
+                time_s: times.time_s[ray],
+                ..cells.row(ray * gates..(ray + 1) * gates)
+            });
+            is_still.push(moving.as_ref().is_none_or(|moves| moves[ray] != 1.0));
+            let nyquist_m_s = nyquist_m_s.as_ref().map_or(f64::NAN, |all| all[ray]);
+            fold_m_s.push(2.0 * nyquist_m_s);
+        }
         Ok(Self {
-            rows: (0..count).map(row).collect(),
-            is_still: (0..count).map(is_still).collect(),
-            fold_m_s: (0..count).map(fold).collect(),
+            rows,
+            is_still,
+            fold_m_s,
             sweeps,
             reference: times.reference,
             scans: mean_count(cells.realisations.iter().flatten().copied()),
@@ -154,21 +152,41 @@ impl Rays {
     }
 }
 
+/// Values of a variable for each ray, in SI, if the file has it.
+fn ray_values(
+    file: &NetcdfFile,
+    known: &VariableNames,
+    quantity: Quantity,
+    rays: usize,
+    sweeps: &[std::ops::Range<usize>],
+) -> Result<Option<Vec<f64>>, String> {
+    match variable::find(file, known) {
+        Some(name) => {
+            let values = variable::values(file, name, quantity)?;
+            variable::of_rays(name, values, rays, sweeps).map(Some)
+        }
+        None => Ok(None),
+    }
+}
+
 /// Rays in groups of one Nyquist velocity, with the multiple of which their velocities may lack: its double, if it is known.
 fn by_fold(rays: &[usize], fold_m_s: &[f64]) -> Vec<(Option<f64>, Vec<usize>)> {
     let mut groups: Vec<(Option<f64>, Vec<usize>)> = Vec::new();
     for ray in rays {
         let own = Some(fold_m_s[*ray]).filter(|fold| *fold > 0.0 && fold.is_finite());
-        let is_same = |(fold, _): &&mut (Option<f64>, Vec<usize>)| match (*fold, own) {
-            (Some(fold), Some(own)) => (own / fold - 1.0).abs() < ONE_NYQUIST,
-            (fold, own) => fold == own,
-        };
-        match groups.iter_mut().find(is_same) {
+        match groups.iter_mut().find(|(fold, _)| is_one_fold(*fold, own)) {
             Some((_, group)) => group.push(*ray),
             None => groups.push((own, vec![*ray])),
         }
     }
     groups
+}
+
+fn is_one_fold(fold_m_s: Option<f64>, other_m_s: Option<f64>) -> bool {
+    match (fold_m_s, other_m_s) {
+        (Some(fold), Some(other)) => (other / fold - 1.0).abs() < ONE_NYQUIST,
+        (fold, other) => fold == other,
+    }
 }
 
 /// What the gates of all rays hold, one ray after the other.
@@ -232,14 +250,16 @@ impl Cells {
 
     /// The velocities of a ray, and their standard deviations.
     fn row(&self, cells: std::ops::Range<usize>) -> RayRow {
-        let count = |at: usize| self.realisations.as_ref().map(|count| count[at]);
-        let sigma = |sigma_m_s: &Vec<f64>| {
-            let own = cells.clone().map(|at| of_mean(sigma_m_s[at], count(at)));
-            own.collect()
-        };
+        let mut sigma_m_s = Vec::new();
+        if let Some(all) = &self.sigma_m_s {
+            for cell in cells.clone() {
+                let count = self.realisations.as_ref().map(|count| count[cell]);
+                sigma_m_s.push(of_mean(all[cell], count));
+            }
+        }
         RayRow {
-            sigma_m_s: self.sigma_m_s.as_ref().map(sigma).unwrap_or_default(),
-            velocity_m_s: self.velocity_m_s[cells.clone()].to_vec(),
+            sigma_m_s,
+            velocity_m_s: self.velocity_m_s[cells].to_vec(),
             ..RayRow::default()
         }
     }
@@ -297,18 +317,9 @@ impl GateLayout {
                 "variable {name} is {a} x {b}; {rays} rays x {gates} ranges are needed"
             )),
             [_] if file.has("ray_start_index") && file.has("ray_n_gates") => {
-                let whole = |name: &str| -> Result<Vec<usize>, String> {
-                    let values = file.floats(name)?;
-                    let bad = values.iter().any(|v| !(*v >= 0.0 && *v < 1e9));
-                    match bad || values.len() != rays {
-                        true => Err(format!("{name} must have a whole number for each ray")),
-                        false => Ok(values.into_iter().map(|v| v as usize).collect()),
-                    }
-                };
-                let own: Vec<_> = whole("ray_start_index")?
-                    .into_iter()
-                    .zip(whole("ray_n_gates")?)
-                    .collect();
+                let starts = whole_numbers(file, "ray_start_index", rays)?;
+                let counts = whole_numbers(file, "ray_n_gates", rays)?;
+                let own: Vec<_> = starts.into_iter().zip(counts).collect();
                 if let Some((_, count)) = own.iter().find(|(_, count)| *count > gates) {
                     return Err(format!("a ray has {count} gates, range {gates} values"));
                 }
@@ -370,25 +381,37 @@ fn ranges(file: &NetcdfFile) -> Result<Vec<f64>, String> {
     }
 }
 
+/// Whole numbers of a variable, one for each ray.
+fn whole_numbers(file: &NetcdfFile, name: &str, rays: usize) -> Result<Vec<usize>, String> {
+    let values = file.floats(name)?;
+    let bad = values.iter().any(|v| !(*v >= 0.0 && *v < 1e9));
+    match bad || values.len() != rays {
+        true => Err(format!("{name} must have a whole number for each ray")),
+        false => Ok(values.into_iter().map(|v| v as usize).collect()),
+    }
+}
+
 /// The one row that a variable repeats for each ray; rows without a value are passed over.
 fn same_rows(name: &str, values: &[f64], gates: usize) -> Result<Vec<f64>, String> {
     let mut rows = values
         .chunks_exact(gates.max(1))
         .filter(|row| row.iter().all(|value| value.is_finite()));
     let first = rows.next().unwrap_or_default();
-    let is_same = |row: &[f64]| {
-        row.iter()
-            .zip(first)
-            .all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs())
-    };
-    match rows.all(is_same) {
-        true => Ok(first.to_vec()),
-        // The ranges along the first dimension.
-        false if is_constant(values, gates) => Ok(values.iter().step_by(gates).copied().collect()),
+    if rows.all(|row| are_same(row, first)) {
+        return Ok(first.to_vec());
+    }
+    // The ranges along the first dimension.
+    match is_constant(values, gates) {
+        true => Ok(values.iter().step_by(gates).copied().collect()),
         false => Err(format!(
             "{name} has two dimensions: gates that are the same for all rays are needed"
         )),
     }
+}
+
+fn are_same(row: &[f64], other: &[f64]) -> bool {
+    let mut pairs = row.iter().zip(other);
+    pairs.all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs())
 }
 
 /// Whether each row is one value.
@@ -424,16 +447,17 @@ fn sweeps(file: &NetcdfFile, count: usize) -> Result<Vec<std::ops::Range<usize>>
     let starts = file.floats(start)?;
     let ends = file.floats(end)?;
     let last = count.max(1) - 1;
-    let range = |(sweep, (start, end)): (usize, (&f64, &f64))| match 0.0 <= *start
-        && start <= end
-        && *end < count as f64
-    {
-        true => Ok(*start as usize..*end as usize + 1),
-        false => Err(format!(
-            "sweep {sweep} goes from ray {start} to ray {end}; the file has rays 0 to {last}"
-        )),
-    };
-    starts.iter().zip(&ends).enumerate().map(range).collect()
+    let mut sweeps = Vec::with_capacity(starts.len());
+    for (start, end) in starts.into_iter().zip(ends) {
+        if !(0.0 <= start && start <= end && end < count as f64) {
+            let sweep = sweeps.len();
+            return Err(format!(
+                "sweep {sweep} goes from ray {start} to ray {end}; the file has rays 0 to {last}"
+            ));
+        }
+        sweeps.push(start as usize..end as usize + 1);
+    }
+    Ok(sweeps)
 }
 
 /// The duration of a pulse, s: the first one above 0, if the file has any.

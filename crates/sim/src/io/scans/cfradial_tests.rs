@@ -108,7 +108,7 @@ fn made() -> Made {
 
 fn read(made: &Made) -> Result<(Vec<ReadScan>, Vec<String>), String> {
     let found = scans(&made.open(), Path::new("x.nc"), &ScanFormat::default(), 0)?;
-    Ok((found.scans, found.left_out))
+    Ok((found.scans, found.skipped))
 }
 
 #[test]

@@ -39,9 +39,14 @@ pub(super) fn of_mean(sigma_m_s: f64, count: Option<f64>) -> f64 {
 
 /// Scans of which the velocities of a map are means, from those of each cell; 1 where none are counted.
 pub(super) fn mean_count(counts: impl Iterator<Item = f64>) -> f64 {
-    let (sum, cells) = counts
-        .filter(|count| *count > 0.0)
-        .fold((0.0, 0.0), |(sum, cells), c| (sum + c, cells + 1.0));
+    let mut sum = 0.0;
+    let mut cells = 0.0;
+    for count in counts {
+        if count > 0.0 {
+            sum += count;
+            cells += 1.0;
+        }
+    }
     if cells > 0.0 { sum / cells } else { 1.0 }
 }
 
@@ -52,30 +57,8 @@ pub(super) fn scan_map(
     fold_m_s: Option<f64>,
     what: &str,
 ) -> Result<ScanMap, String> {
+    check_ranges(&range_m).map_err(|reason| format!("{what}: {reason}"))?;
     let gates = range_m.len();
-    if let Some(pair) = range_m
-        .windows(2)
-        .find(|pair| pair[1].is_nan() || pair[1] <= pair[0])
-    {
-        let one_m = pair[0];
-        let next_m = pair[1];
-        return Err(format!(
-            "{what}: range must increase from gate to gate, and {one_m} m is followed by {next_m} m"
-        ));
-    }
-    if !range_m
-        .first()
-        .is_some_and(|first| *first >= 0.0 && first.is_finite())
-    {
-        return Err(format!(
-            "{what}: range must be at least 0 m at the first gate"
-        ));
-    }
-    if let Some(far) = range_m.last().filter(|last| **last > FARTHEST_M) {
-        return Err(format!(
-            "{what}: range reaches {far} m: at most {FARTHEST_M} m are read"
-        ));
-    }
     rays.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
     let lines: Vec<&[RayRow]> = rays
         .chunk_by(|a, b| a.elevation_rad == b.elevation_rad)
@@ -87,71 +70,111 @@ pub(super) fn scan_map(
             lines.len()
         ));
     }
-    let has_sigma = rays.iter().all(|ray| !ray.sigma_m_s.is_empty());
-    let mean_at = |line: &[RayRow], of: &dyn Fn(&RayRow) -> f64| {
-        let values: Vec<f64> = line
-            .iter()
-            .map(of)
-            .filter(|value| value.is_finite())
-            .collect();
-        values.iter().sum::<f64>() / values.len() as f64
-    };
-    let sigma_at = |line: usize, gate: usize| {
-        let rows = lines[line];
-        let count = rows
-            .iter()
-            .filter(|ray| ray.velocity_m_s[gate].is_finite())
-            .count();
-        mean_at(rows, &|ray| ray.sigma_m_s[gate]) / (count as f64).sqrt()
-    };
     let mut velocity_m_s = Array2::from_shape_fn((lines.len(), gates), |(line, gate)| {
-        mean_at(lines[line], &|ray| ray.velocity_m_s[gate])
+        let velocities = lines[line].iter().map(|ray| ray.velocity_m_s[gate]);
+        finite_mean(velocities.collect())
     });
-    let is_known = |sigma: &f64| sigma.is_finite() && *sigma > 0.0;
-    let sigma_m_s = has_sigma
-        .then(|| Array2::from_shape_fn((lines.len(), gates), |(line, gate)| sigma_at(line, gate)));
-    let mut sigma_m_s = sigma_m_s.filter(|sigma| sigma.iter().any(is_known));
-    if let Some(sigma) = &mut sigma_m_s {
-        // A velocity of unknown error counts for nothing.
-        velocity_m_s.zip_mut_with(sigma, |velocity, sigma| {
-            *velocity = if is_known(sigma) { *velocity } else { f64::NAN };
-        });
-        sigma.mapv_inplace(|sigma| if is_known(&sigma) { sigma } else { 1.0 });
+    let sigma_m_s = line_sigmas_m_s(&lines, &mut velocity_m_s);
+    check_velocities(&velocity_m_s).map_err(|reason| format!("{what}: {reason}"))?;
+    let mut elevation_rad = Vec::with_capacity(lines.len());
+    let mut time_s = Vec::with_capacity(lines.len());
+    for line in &lines {
+        elevation_rad.push(line[0].elevation_rad);
+        time_s.push(finite_mean(line.iter().map(|ray| ray.time_s).collect()));
     }
+    // Of all lines, or of none.
+    if !time_s.iter().all(|time_s| time_s.is_finite()) {
+        time_s.fill(f64::NAN);
+    }
+    Ok(ScanMap {
+        elevation_rad,
+        time_s,
+        range_m,
+        velocity_m_s,
+        sigma_m_s,
+        fold_m_s: fold_m_s.filter(|fold| *fold > 0.0 && fold.is_finite()),
+    })
+}
+
+/// Refuses ranges that do not increase or lie beyond what a scene allows.
+fn check_ranges(range_m: &[f64]) -> Result<(), String> {
+    for pair in range_m.windows(2) {
+        let one_m = pair[0];
+        let next_m = pair[1];
+        if next_m.is_nan() || next_m <= one_m {
+            return Err(format!(
+                "range must increase from gate to gate, and {one_m} m is followed by {next_m} m"
+            ));
+        }
+    }
+    if !range_m
+        .first()
+        .is_some_and(|first| *first >= 0.0 && first.is_finite())
+    {
+        return Err("range must be at least 0 m at the first gate".into());
+    }
+    match range_m.last().filter(|last| **last > FARTHEST_M) {
+        Some(far) => Err(format!(
+            "range reaches {far} m: at most {FARTHEST_M} m are read"
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Refuses too few velocities, and such as no wind has.
+fn check_velocities(velocity_m_s: &Array2<f64>) -> Result<(), String> {
     let values = velocity_m_s
         .iter()
         .filter(|value| value.is_finite())
         .count();
     if values < FEWEST_VELOCITIES {
         return Err(match values {
-            0 => format!("{what}: all of its velocities are missing"),
+            0 => "all of its velocities are missing".into(),
             _ => format!(
-                "{what}: it has {values} velocities that are not missing; at least {FEWEST_VELOCITIES} are needed"
+                "it has {values} velocities that are not missing; at least {FEWEST_VELOCITIES} are needed"
             ),
         });
     }
-    if let Some(bad) = velocity_m_s.iter().find(|value| value.abs() > 500.0) {
-        return Err(format!(
-            "{what}: a velocity is {bad} m/s: its unit must be m/s, and a missing one its fill value"
-        ));
+    match velocity_m_s.iter().find(|value| value.abs() > 500.0) {
+        Some(bad) => Err(format!(
+            "a velocity is {bad} m/s: its unit must be m/s, and a missing one its fill value"
+        )),
+        None => Ok(()),
     }
-    let time_s: Vec<f64> = lines
-        .iter()
-        .map(|line| mean_at(line, &|ray| ray.time_s))
-        .collect();
-    Ok(ScanMap {
-        elevation_rad: lines.iter().map(|line| line[0].elevation_rad).collect(),
-        // Of all lines, or of none.
-        time_s: if time_s.iter().all(|time| time.is_finite()) {
-            time_s
-        } else {
-            vec![f64::NAN; lines.len()]
-        },
-        range_m,
-        velocity_m_s,
-        sigma_m_s,
-        fold_m_s: fold_m_s.filter(|fold| *fold > 0.0 && fold.is_finite()),
-    })
+}
+
+/// Standard deviations of the velocities of lines, if rays have them; velocities of unknown standard deviation become missing.
+fn line_sigmas_m_s(lines: &[&[RayRow]], velocity_m_s: &mut Array2<f64>) -> Option<Array2<f64>> {
+    let mut rays = lines.iter().copied().flatten();
+    if rays.any(|ray| ray.sigma_m_s.is_empty()) {
+        return None;
+    }
+    let mut sigma_m_s = Array2::from_shape_fn(velocity_m_s.dim(), |(line, gate)| {
+        let rays = lines[line];
+        let finite = rays.iter().filter(|ray| ray.velocity_m_s[gate].is_finite());
+        let count = finite.count() as f64;
+        finite_mean(rays.iter().map(|ray| ray.sigma_m_s[gate]).collect()) / count.sqrt()
+    });
+    if !sigma_m_s.iter().copied().any(is_known_sigma) {
+        return None;
+    }
+    velocity_m_s.zip_mut_with(&sigma_m_s, |velocity, sigma| {
+        if !is_known_sigma(*sigma) {
+            *velocity = f64::NAN;
+        }
+    });
+    sigma_m_s.mapv_inplace(|sigma| if is_known_sigma(sigma) { sigma } else { 1.0 });
+    Some(sigma_m_s)
+}
+
+fn is_known_sigma(sigma_m_s: f64) -> bool {
+    sigma_m_s.is_finite() && sigma_m_s > 0.0
+}
+
+/// Mean of the finite values; NaN if there are none.
+fn finite_mean(mut values: Vec<f64>) -> f64 {
+    values.retain(|value| value.is_finite());
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 #[cfg(test)]

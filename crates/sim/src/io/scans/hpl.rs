@@ -42,13 +42,47 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
         head.push(line.trim());
     }
     let header = Header::new(&head)?;
-    let range_m: Vec<f64> = (0..header.gates)
-        .map(|gate| 0.5 * header.gate_length_m + gate as f64 * header.gate_step_m)
-        .collect();
+    let lines: Vec<(usize, &str)> = lines.filter(|(_, line)| !line.trim().is_empty()).collect();
+    let (mut rays, intensities) = rays(&header, &lines)?;
+    if let Some(stated) = header.rays.filter(|stated| *stated > rays.len()) {
+        return Err(format!(
+            "it is cut short: it has {} of {stated} rays",
+            rays.len()
+        ));
+    }
+    mask_noise(&mut rays, &intensities, format);
+    let mut range_m = Vec::with_capacity(header.gates);
+    for gate in 0..header.gates {
+        range_m.push(0.5 * header.gate_length_m + gate as f64 * header.gate_step_m);
+    }
+    let (scans, skipped) = planes::in_order(rays)?;
+    let mut found = Found {
+        skipped,
+        ..Found::default()
+    };
+    for (sweep, scan) in scans.into_iter().enumerate() {
+        let what = format!("scan {}", sweep + 1);
+        match scan_map(scan.rays, range_m.clone(), None, &what) {
+            Err(reason) => found.skipped.push(reason),
+            Ok(map) => found.scans.push(ReadScan {
+                azimuth_rad: scan.azimuth_rad,
+                reference: header.midnight,
+                gate_length_m: Some(header.gate_length_m),
+                is_own: head.contains(&crate::io::hpl::SYSTEM_ID),
+                ..ReadScan::new(path, sweep, map)
+            }),
+        }
+    }
+    found.warnings.extend(header.not_understood);
+    Ok(found)
+}
+
+/// The rays of numbered lines and the intensities of their gates.
+fn rays(header: &Header, lines: &[(usize, &str)]) -> Result<(Vec<RayRow>, Vec<Vec<f64>>), String> {
     let mut rays: Vec<RayRow> = Vec::new();
     let mut intensities: Vec<Vec<f64>> = Vec::new();
-    let mut clock = Clock::new(&header);
-    let mut rest = lines.filter(|(_, line)| !line.trim().is_empty());
+    let mut clock = Clock::new(header);
+    let mut rest = lines.iter();
     while let Some((number, line)) = rest.next() {
         let [hours, azimuth, elevation] = numbers(line)
             .and_then(|n| n.get(..3)?.try_into().ok())
@@ -68,10 +102,15 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
                     header.gates
                 )
             })?;
-            let row = numbers(line).filter(|row| row.len() >= 3 && row[0] == gate as f64).ok_or_else(|| {
-                format!("line {}: gate {gate} of ray {ray} is expected, with velocity and intensity", number + 1)
+            let row = numbers(line).filter(|row| row.len() >= 3 && row[0] == gate as f64);
+            let row = row.ok_or_else(|| {
+                format!(
+                    "line {}: gate {gate} of ray {ray} is expected, with velocity and intensity",
+                    number + 1
+                )
             })?;
-            (velocity_m_s[gate], intensity[gate]) = (row[1], row[2]);
+            velocity_m_s[gate] = row[1];
+            intensity[gate] = row[2];
         }
         rays.push(RayRow {
             elevation_rad: elevation.to_radians(),
@@ -82,33 +121,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
         });
         intensities.push(intensity);
     }
-    if let Some(stated) = header.rays.filter(|stated| *stated > rays.len()) {
-        return Err(format!(
-            "it is cut short: it has {} of {stated} rays",
-            rays.len()
-        ));
-    }
-    mask_noise(&mut rays, &intensities, format);
-    let (scans, left_out) = planes::in_order(rays)?;
-    let mut found = Found {
-        left_out,
-        ..Found::default()
-    };
-    for (sweep, scan) in scans.into_iter().enumerate() {
-        let what = format!("scan {}", sweep + 1);
-        match scan_map(scan.rays, range_m.clone(), None, &what) {
-            Err(reason) => found.left_out.push(reason),
-            Ok(map) => found.scans.push(ReadScan {
-                azimuth_rad: scan.azimuth_rad,
-                reference: header.midnight,
-                gate_length_m: Some(header.gate_length_m),
-                is_own: head.contains(&crate::io::hpl::SYSTEM_ID),
-                ..ReadScan::new(path, sweep, map)
-            }),
-        }
-    }
-    found.warnings.extend(header.not_understood);
-    Ok(found)
+    Ok((rays, intensities))
 }
 
 /// Times of rays from their hours since midnight, which begin anew on the next day.
@@ -151,41 +164,20 @@ impl Clock {
 
 impl Header {
     fn new(lines: &[&str]) -> Result<Self, String> {
-        // Keys differ in case and in what follows them.
-        let value = |key: &str| {
-            lines.iter().find_map(|line| {
-                let (name, value) = line.split_once(':')?;
-                name.trim()
-                    .to_ascii_lowercase()
-                    .starts_with(key)
-                    .then(|| value.trim())
-            })
-        };
-        let number = |key: &str| value(key).and_then(|text| numbers(text)?.first().copied());
-        let gates = number("number of gates")
+        let gates = header_number(lines, "number of gates")
             .filter(|n| *n >= 1.0 && *n <= MOST_GATES as f64 && n.fract() == 0.0);
         let gates = gates.ok_or("its header has no number of gates")? as usize;
-        let gate_length_m =
-            number("range gate length").filter(|length| *length > 0.0 && length.is_finite());
+        let gate_length_m = header_number(lines, "range gate length")
+            .filter(|length| *length > 0.0 && length.is_finite());
         let gate_length_m = gate_length_m.ok_or("its header has no range gate length above 0 m")?;
-        let formula = lines
-            .iter()
-            .map(|line| line.to_ascii_lowercase())
-            .find(|line| {
-                line.starts_with("range of measurement")
-                    || line.starts_with("altitude of measurement")
-            });
-        let overlapping = value("scan type")
-            .is_some_and(|kind| kind.to_ascii_lowercase().contains("overlapping"))
-            || formula.is_some_and(|formula| formula.replace(' ', "").contains("/2+"));
-        let points = number("gate length (pts)").filter(|points| *points >= 1.0);
-        let gate_step_m = match (overlapping, points) {
+        let points = header_number(lines, "gate length (pts)").filter(|points| *points >= 1.0);
+        let gate_step_m = match (have_overlap(lines), points) {
             (false, _) => gate_length_m,
             (true, Some(points)) => gate_length_m / points,
             (true, None) => OVERLAP_STEP_M,
         };
-        let rays = number("no. of rays in file").map(|rays| rays.max(0.0) as usize);
-        let stated = value("start time");
+        let rays = header_number(lines, "no. of rays in file").map(|rays| rays.max(0.0) as usize);
+        let stated = header_value(lines, "start time");
         let start = stated.and_then(UtcTime::parse_reference);
         let second_of_day = start.map(|(start, _)| start.second_of_day() as f64);
         Ok(Self {
@@ -209,21 +201,55 @@ fn numbers(line: &str) -> Option<Vec<f64>> {
         .collect()
 }
 
+/// The value of a key of the header; keys differ in case and in what follows them.
+fn header_value<'t>(lines: &[&'t str], key: &str) -> Option<&'t str> {
+    for line in lines {
+        if let Some((name, value)) = line.split_once(':')
+            && name.trim().to_ascii_lowercase().starts_with(key)
+        {
+            return Some(value.trim());
+        }
+    }
+    None
+}
+
+fn header_number(lines: &[&str], key: &str) -> Option<f64> {
+    numbers(header_value(lines, key)?)?.first().copied()
+}
+
+/// Whether gates overlap: by the scan type, or by the first formula of the ranges.
+fn have_overlap(lines: &[&str]) -> bool {
+    let kind = header_value(lines, "scan type").unwrap_or_default();
+    if kind.to_ascii_lowercase().contains("overlapping") {
+        return true;
+    }
+    for line in lines {
+        let line = line.to_ascii_lowercase();
+        if line.starts_with("range of measurement") || line.starts_with("altitude of measurement") {
+            return line.replace(' ', "").contains("/2+");
+        }
+    }
+    false
+}
+
+/// Standard deviation of the intensities of noise, which are on both sides of 1, where those of signals are above.
+fn noise_deviation(intensities: &[Vec<f64>]) -> f64 {
+    let mut sum = 0.0;
+    let mut count = 0;
+    for intensity in intensities.iter().flatten() {
+        if *intensity < 1.0 {
+            sum += (intensity - 1.0).powi(2);
+            count += 1;
+        }
+    }
+    (sum / f64::from(count.max(1))).sqrt()
+}
+
 /// Takes out the velocities of noise.
 fn mask_noise(rays: &mut [RayRow], intensities: &[Vec<f64>], format: &ScanFormat) {
     let least = match format.min_snr_db {
         Some(db) => 1.0 + 10f64.powf(0.1 * db),
-        None => {
-            // Noise is on both sides of 1, signals above.
-            let below: Vec<f64> = intensities
-                .iter()
-                .flatten()
-                .filter(|i| **i < 1.0)
-                .map(|i| (i - 1.0).powi(2))
-                .collect();
-            let deviation = (below.iter().sum::<f64>() / below.len().max(1) as f64).sqrt();
-            1.0 + SIGMAS_ABOVE_NOISE * deviation
-        }
+        None => 1.0 + SIGMAS_ABOVE_NOISE * noise_deviation(intensities),
     };
     for (ray, intensity) in rays.iter_mut().zip(intensities) {
         for (velocity, intensity) in ray.velocity_m_s.iter_mut().zip(intensity) {
@@ -279,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_left_out_and_hours_go_on_after_midnight() {
+    fn noise_is_skipped_and_hours_go_on_after_midnight() {
         let found = read(&file(&[]), &ScanFormat::default());
         let map = &found.map;
         assert_eq!(

@@ -131,10 +131,9 @@ pub fn share_origin(scans: &mut [&mut ReadScan]) -> Vec<PathBuf> {
             continue;
         };
         let later_s = own.seconds_since(first);
-        scan.map
-            .time_s
-            .iter_mut()
-            .for_each(|time_s| *time_s += later_s);
+        for time_s in &mut scan.map.time_s {
+            *time_s += later_s;
+        }
         scan.reference = Some(first);
     }
     undated
@@ -145,7 +144,7 @@ pub fn share_origin(scans: &mut [&mut ReadScan]) -> Vec<PathBuf> {
 struct Found {
     scans: Vec<ReadScan>,
     /// Sweeps and rays that are of no use, and why.
-    left_out: Vec<String>,
+    skipped: Vec<String>,
     /// What was not understood.
     warnings: Vec<String>,
 }
@@ -162,22 +161,21 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
         _ => text(path, length, format)?,
     };
     if found.scans.is_empty() {
-        return Err(Error::Input {
-            path: path.to_owned(),
-            reason: match &found.left_out[..] {
-                [only] => only.clone(),
-                all => format!(
-                    "it has no scan in elevation (RHI) that can be used: {}",
-                    all.join("; ")
-                ),
-            },
-        });
+        let reason = match &found.skipped[..] {
+            [only] => only.clone(),
+            all => format!(
+                "it has no scan in elevation (RHI) that can be used: {}",
+                all.join("; ")
+            ),
+        };
+        return Err(Error::input(path, reason));
     }
-    let left_out = found
-        .left_out
-        .iter()
-        .map(|what| format!("{what}: left out"));
-    Ok((found.scans, left_out.chain(found.warnings).collect()))
+    let mut notes = Vec::new();
+    for what in found.skipped {
+        notes.push(format!("{what}: left out"));
+    }
+    notes.extend(found.warnings);
+    Ok((found.scans, notes))
 }
 
 fn netcdf(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
@@ -187,32 +185,33 @@ fn netcdf(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
         let found = cfradial::scans(&group, path, format, sweep);
         let found = found.map_err(|reason| group.refuse(reason))?;
         all.scans.extend(found.scans);
-        all.left_out.extend(found.left_out);
+        all.skipped.extend(found.skipped);
         all.warnings.extend(found.warnings);
     }
     Ok(all)
 }
 
 fn text(path: &Path, length: u64, format: &ScanFormat) -> Result<Found, Error> {
-    let refuse = |reason: String| Error::Input {
-        path: path.to_owned(),
-        reason,
-    };
     if length > LARGEST_TEXT_BYTES {
-        return Err(refuse(format!(
-            "it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read"
-        )));
+        return Err(Error::input(
+            path,
+            format!("it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read"),
+        ));
     }
     let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
+    scans_of_text(&bytes, path, format).map_err(|reason| Error::input(path, reason))
+}
+
+fn scans_of_text(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<Found, String> {
     // The text, and a text of its own for each cell.
     let cells = bytes
         .iter()
         .filter(|byte| matches!(byte, b',' | b';' | b'\n' | b' ' | b'\t'))
         .count();
-    machine::holds("its table", 2.0 * length as f64 + 64.0 * cells as f64).map_err(refuse)?;
+    machine::holds("its table", 2.0 * bytes.len() as f64 + 64.0 * cells as f64)?;
     // Files of instruments have names of places in all encodings; numbers are the same in each.
     let text =
-        text_file::decode(&bytes).unwrap_or_else(|_| String::from_utf8_lossy(&bytes).into_owned());
+        text_file::decode(bytes).unwrap_or_else(|_| String::from_utf8_lossy(bytes).into_owned());
     let is_hpl = text
         .lines()
         .take(60)
@@ -224,7 +223,6 @@ fn text(path: &Path, length: u64, format: &ScanFormat) -> Result<Found, Error> {
         true => hpl::scans(&text, path, format),
         false => table::scans(&text, path, format),
     }
-    .map_err(refuse)
 }
 
 /// Largest text that is read \[bytes\].

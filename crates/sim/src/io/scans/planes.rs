@@ -8,10 +8,9 @@
 
 use super::ReadScan;
 use super::grid::RayRow;
-use ndarray::{Array2, s};
+use ndarray::s;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 use std::ops::Range;
-use wakescope_estimate::retrieval::ScanMap;
 
 /// Largest angle between a ray and the plane of its scan, rad, and between two rays of a scan.
 const OFF_PLANE_RAD: f64 = 0.02;
@@ -84,6 +83,16 @@ impl Plane {
         self.turn_rad(ray).abs() > FRAC_PI_2
     }
 
+    /// Whether a ray lies in the front of the plane.
+    fn has_in_front(self, ray: &RayRow) -> bool {
+        self.across(ray).abs() <= OFF_PLANE_RAD && !self.is_behind(ray)
+    }
+
+    /// Whether a ray lies in the back of the plane.
+    fn has_behind(self, ray: &RayRow) -> bool {
+        self.is_behind(ray) && self.across(ray).abs() <= OFF_PLANE_RAD
+    }
+
     /// Elevation of a ray from the horizon in front, rad.
     fn elevation_rad(self, ray: &RayRow) -> f64 {
         if self.is_behind(ray) {
@@ -150,20 +159,23 @@ impl<'r> Run<'r> {
 
     /// The scans of the run, without rays of isolated elevation.
     fn scans(&self) -> Vec<PlaneScan> {
-        let elevations = |rays: &[&RayRow]| -> Vec<f64> {
-            rays.iter()
-                .map(|ray| self.plane.elevation_rad(ray))
-                .collect()
-        };
-        let is_isolated = isolated(&elevations(&self.rays));
-        let with_steps = self.rays.iter().zip(is_isolated);
-        let rays: Vec<&RayRow> = with_steps
-            .filter_map(|(ray, is_isolated)| (!is_isolated).then_some(*ray))
-            .collect();
-        let parts = between_turns(&elevations(&rays));
-        parts
-            .into_iter()
-            .filter_map(|part| in_one_plane(self.plane, &rays[part]))
+        let is_isolated = isolated(&self.elevations_rad(&self.rays));
+        let mut rays = Vec::with_capacity(self.rays.len());
+        for (ray, is_isolated) in self.rays.iter().zip(is_isolated) {
+            if !is_isolated {
+                rays.push(*ray);
+            }
+        }
+        let mut scans = Vec::new();
+        for part in between_turns(&self.elevations_rad(&rays)) {
+            scans.extend(in_one_plane(self.plane, &rays[part]));
+        }
+        scans
+    }
+
+    fn elevations_rad(&self, rays: &[&RayRow]) -> Vec<f64> {
+        rays.iter()
+            .map(|ray| self.plane.elevation_rad(ray))
             .collect()
     }
 }
@@ -232,6 +244,10 @@ fn at_azimuths(scans: &[PlaneScan]) -> String {
     format!(" at azimuth {} degrees", azimuths.join(", "))
 }
 
+fn is_impossible(ray: &RayRow) -> bool {
+    !ray.elevation_rad.is_nan() && !ALLOWED_RAD.contains(&ray.elevation_rad)
+}
+
 /// Removes rays without a possible elevation, in words; elevations below the horizon may count on from 270 degrees.
 ///
 /// # Errors
@@ -243,10 +259,8 @@ fn drop_impossible(rays: &mut Vec<RayRow>) -> Result<Option<String>, String> {
             ray.elevation_rad -= TAU;
         }
     }
-    let is_impossible =
-        |ray: &&RayRow| !ray.elevation_rad.is_nan() && !ALLOWED_RAD.contains(&ray.elevation_rad);
-    let count = rays.iter().filter(is_impossible).count();
-    if let Some(bad) = rays.iter().find(is_impossible)
+    let count = rays.iter().filter(|ray| is_impossible(ray)).count();
+    if let Some(bad) = rays.iter().find(|ray| is_impossible(ray))
         && count as f64 > (IMPOSSIBLE * all as f64).max(1.0)
     {
         return Err(format!(
@@ -297,10 +311,7 @@ fn runs(rays: &[RayRow]) -> Vec<Run<'_>> {
 fn by_plane(rays: &[RayRow]) -> Vec<PlaneScan> {
     let mut sides: Vec<Run<'_>> = Vec::new();
     for ray in rays {
-        let has = |side: &&mut Run<'_>| {
-            side.plane.across(ray).abs() <= OFF_PLANE_RAD && !side.plane.is_behind(ray)
-        };
-        match sides.iter_mut().find(has) {
+        match sides.iter_mut().find(|side| side.plane.has_in_front(ray)) {
             Some(side) => side.rays.push(ray),
             None => {
                 let mut side = Run::new(Plane::first_of([ray]));
@@ -314,11 +325,7 @@ fn by_plane(rays: &[RayRow]) -> Vec<PlaneScan> {
         let Run {
             plane, mut rays, ..
         } = sides.remove(0);
-        let is_back = |side: &Run<'_>| {
-            let first = side.rays[0];
-            plane.is_behind(first) && plane.across(first).abs() <= OFF_PLANE_RAD
-        };
-        if let Some(back) = sides.iter().position(is_back)
+        if let Some(back) = sides.iter().position(|side| plane.has_behind(side.rays[0]))
             && reaches_up(&rays)
             && reaches_up(&sides[back].rays)
         {
@@ -342,8 +349,9 @@ fn in_one_plane(near: Plane, rays: &[&RayRow]) -> Option<PlaneScan> {
     let plane = Plane {
         azimuth_rad: turn_rad.map_or(f64::NAN, |turn_rad| near.azimuth_rad + turn_rad),
     };
-    let is_in_it = |ray: &&&RayRow| plane.across(ray).abs() <= OFF_PLANE_RAD;
-    let rays = rays.iter().filter(is_in_it);
+    let rays = rays
+        .iter()
+        .filter(|ray| plane.across(ray).abs() <= OFF_PLANE_RAD);
     let spread = extent(rays.clone().map(|ray| plane.across(ray)));
     let rays: Vec<RayRow> = rays
         .map(|ray| RayRow {
@@ -411,19 +419,19 @@ fn isolated(elevation_rad: &[f64]) -> Vec<bool> {
     let Some(step) = steps.get(steps.len() / 2).filter(|_| count >= FEWEST_RAYS) else {
         return vec![false; count];
     };
-    let is_isolated = |i: usize| {
+    let mut is_isolated = Vec::with_capacity(count);
+    for (i, own) in elevation_rad.iter().enumerate() {
         let [before, after] = match i {
             0 => [1, 2],
             last if last + 1 == count => [last - 2, last - 1],
             middle => [middle - 1, middle + 1],
         }
         .map(|neighbour| elevation_rad[neighbour]);
-        let away = (elevation_rad[i] - before)
-            .abs()
-            .min((elevation_rad[i] - after).abs());
-        away > ISOLATED_STEPS * step && (after - before).abs() <= NEIGHBOUR_STEPS * step
-    };
-    (0..count).map(is_isolated).collect()
+        let away = (own - before).abs().min((own - after).abs());
+        let are_near = (after - before).abs() <= NEIGHBOUR_STEPS * step;
+        is_isolated.push(away > ISOLATED_STEPS * step && are_near);
+    }
+    is_isolated
 }
 
 /// Scans that follow each other: a line that goes back by more than a tenth of all elevations begins another.
@@ -474,16 +482,17 @@ pub fn are_of_one_plane(one: &ReadScan, other: &ReadScan) -> bool {
 #[must_use]
 pub fn plane_numbers<'s>(scans: impl IntoIterator<Item = &'s ReadScan>) -> Vec<usize> {
     let mut firsts: Vec<&ReadScan> = Vec::new();
-    let number = |scan: &'s ReadScan| {
+    let mut numbers = Vec::new();
+    for scan in scans {
         let known = firsts
             .iter()
             .position(|first| are_of_one_plane(first, scan));
-        known.unwrap_or_else(|| {
+        numbers.push(known.unwrap_or(firsts.len()));
+        if known.is_none() {
             firsts.push(scan);
-            firsts.len() - 1
-        })
-    };
-    scans.into_iter().map(number).collect()
+        }
+    }
+    numbers
 }
 
 /// Turns scans over the zenith that look back in the plane of one before, so that all of a plane have one azimuth.
@@ -495,9 +504,10 @@ pub fn face_alike(scans: &mut [&mut ReadScan]) {
             continue;
         }
         let turned = turned(scan);
-        let faces =
-            |other: &&mut ReadScan| is_over_zenith(other) && are_of_one_plane(other, &turned);
-        if before.iter().any(faces) {
+        if before
+            .iter()
+            .any(|other| is_over_zenith(other) && are_of_one_plane(other, &turned))
+        {
             *scan = turned;
         }
     }
@@ -509,24 +519,22 @@ fn is_over_zenith(scan: &ReadScan) -> bool {
     ends.is_some_and(|(first, last)| *first < FRAC_PI_2 && *last > FRAC_PI_2)
 }
 
-/// A scan as it is with the opposite azimuth.
+/// A scan with the opposite azimuth.
 fn turned(scan: &ReadScan) -> ReadScan {
-    let map = &scan.map;
-    let backwards = |values: &Array2<f64>| values.slice(s![..;-1, ..]).to_owned();
-    ReadScan {
-        azimuth_rad: scan
-            .azimuth_rad
-            .map(|azimuth_rad| (azimuth_rad + PI).rem_euclid(TAU)),
-        map: ScanMap {
-            elevation_rad: map.elevation_rad.iter().rev().map(|e| PI - e).collect(),
-            time_s: map.time_s.iter().rev().copied().collect(),
-            range_m: map.range_m.clone(),
-            velocity_m_s: backwards(&map.velocity_m_s),
-            sigma_m_s: map.sigma_m_s.as_ref().map(backwards),
-            fold_m_s: map.fold_m_s,
-        },
-        ..scan.clone()
+    let mut turned = scan.clone();
+    let azimuth_rad = scan.azimuth_rad;
+    turned.azimuth_rad = azimuth_rad.map(|azimuth_rad| (azimuth_rad + PI).rem_euclid(TAU));
+    let map = &mut turned.map;
+    map.elevation_rad.reverse();
+    for elevation_rad in &mut map.elevation_rad {
+        *elevation_rad = PI - *elevation_rad;
     }
+    map.time_s.reverse();
+    map.velocity_m_s = map.velocity_m_s.slice(s![..;-1, ..]).to_owned();
+    if let Some(sigma_m_s) = &mut map.sigma_m_s {
+        *sigma_m_s = sigma_m_s.slice(s![..;-1, ..]).to_owned();
+    }
+    turned
 }
 
 #[cfg(test)]

@@ -1,4 +1,6 @@
 use super::*;
+use ndarray::Array2;
+use wakescope_estimate::retrieval::ScanMap;
 
 /// Rays at azimuths and elevations in degrees; each has its number as time.
 fn rays(directions: impl IntoIterator<Item = (f64, f64)>) -> Vec<RayRow> {

@@ -16,10 +16,10 @@ const OWN: &str = "v_mean_m_s";
 /// Values of an axis that differ by less than this part of its mean step are the same.
 const SAME: f64 = 1e-3;
 
-/// A row of a table; NaN is what it does not say.
-struct Row {
-    /// In the table, from 1.
-    number: usize,
+/// A velocity of a table; NaN is what it does not say.
+struct TableVelocity {
+    /// Number of its row in the table, from 1.
+    row: usize,
     range_m: f64,
     elevation_rad: f64,
     azimuth_rad: f64,
@@ -38,11 +38,16 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
     // Programs that write it again keep the names of its columns.
     let is_own =
         table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some();
-    let Rows {
-        sweeps,
-        times,
-        without_elevation,
-    } = rows(&table, format, is_own)?;
+    let columns = Columns::new(&table, format, is_own)?;
+    let mut sweeps: BTreeMap<u64, Vec<TableVelocity>> = BTreeMap::new();
+    let mut without_elevation = 0;
+    for row in 0..table.rows.len() {
+        let sweep = columns.sweep(row)?;
+        match columns.velocity(row)? {
+            Some(velocity) => sweeps.entry(sweep).or_default().push(velocity),
+            None => without_elevation += 1,
+        }
+    }
     if sweeps.is_empty() {
         return Err("it has a header and no rows with an elevation".into());
     }
@@ -50,145 +55,200 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
     let mut found = Found::default();
     if without_elevation > 0 {
         let all = table.rows.len();
-        found.left_out.push(format!(
+        found.skipped.push(format!(
             "{without_elevation} of {all} rows have no elevation"
         ));
     }
-    for (sweep, rows) in sweeps {
-        let (rays, range_m) = grid(&rows)?;
+    for (sweep, velocities) in sweeps {
+        let (rays, range_m) = grid(&velocities)?;
         let what = format!("sweep {sweep}");
         let (scans, skipped) =
             planes::in_any_order(rays).map_err(|reason| format!("{what}: {reason}"))?;
         let skipped = skipped.iter().map(|text| format!("{what}: {text}"));
-        found.left_out.extend(skipped);
+        found.skipped.extend(skipped);
         for scan in scans {
             match scan_map(scan.rays, range_m.clone(), None, &what) {
-                Err(reason) => found.left_out.push(reason),
+                Err(reason) => found.skipped.push(reason),
                 Ok(map) => found.scans.push(ReadScan {
                     azimuth_rad: scan.azimuth_rad,
-                    reference: times.reference,
+                    reference: columns.times.reference,
                     scene_toml: scene_toml.clone(),
-                    scans: mean_count(rows.iter().map(|row| row.count)),
+                    scans: mean_count(velocities.iter().map(|velocity| velocity.count)),
                     is_own,
                     ..ReadScan::new(path, sweep as usize, map)
                 }),
             }
         }
     }
-    found.warnings.extend(times.not_understood);
+    found.warnings.extend(columns.times.not_understood);
     Ok(found)
 }
 
-/// The rows of a table.
-struct Rows {
-    sweeps: BTreeMap<u64, Vec<Row>>,
+/// The columns of a table that a scan needs, in SI.
+struct Columns<'t> {
+    table: &'t TextTable,
+    format: &'t ScanFormat,
+    /// Whether this program wrote the table.
+    is_own: bool,
+    velocity: usize,
+    elevation: usize,
+    sweep: Option<usize>,
+    flagged: Option<usize>,
+    /// Scans of which each velocity is the mean.
+    count: Option<usize>,
+    range_m: Vec<f64>,
+    elevation_rad: Vec<f64>,
+    velocity_m_s: Vec<f64>,
+    azimuth_rad: Option<Vec<f64>>,
+    sigma_m_s: Option<Vec<f64>>,
+    ratio_db: Option<Vec<f64>>,
     times: Times,
-    without_elevation: usize,
 }
 
-/// The rows of each sweep. Numbers of this program's maps have the digits of their NetCDF files, single precision and angles in degrees:
-/// fits to what jumps tell the same of both.
-fn rows(table: &TextTable, format: &ScanFormat, is_own: bool) -> Result<Rows, String> {
-    let missing = |name: &str| {
-        format!(
-            "it has no column {name}: range_m, elevation_rad (or elevation_deg), velocity_m_s and, if known, time_s and sigma_m_s are \
-             read, or other units in their names; it has {}",
-            columns(table)
-        )
-    };
-    let velocity = match &format.field {
-        Some(name) => table
-            .column(name)
-            .map(|at| table.header[at].as_str())
-            .ok_or_else(|| {
-                format!(
-                    "it has no column {name}, which --field names; it has {}",
-                    columns(table)
-                )
-            })?,
-        None => variable::find(table, &VELOCITY).ok_or_else(|| missing("velocity_m_s"))?,
-    };
-    let optional = |known: &VariableNames, quantity| match variable::find(table, known) {
-        Some(name) => variable::values(table, name, quantity).map(Some),
-        None => Ok::<_, String>(None),
-    };
-    let range = variable::find(table, &RANGE).ok_or_else(|| missing("range_m"))?;
-    let ranges_m = variable::values(table, range, Quantity::Length)?;
-    let (elevation, elevations_rad) =
-        variable::elevations_rad(table)?.ok_or_else(|| missing("elevation_rad"))?;
-    let elevation = table.column(elevation).unwrap_or_default();
-    let velocities_m_s = variable::values(table, velocity, Quantity::Velocity)?;
-    let azimuths_rad = optional(&AZIMUTH, Quantity::Angle)?;
-    let sigmas_m_s = optional(&SIGMA, Quantity::Velocity)?;
-    let times = variable::times(table, table.rows.len())?;
-    let ratios_db = match (format.min_snr_db, variable::find(table, &RATIO)) {
-        (None, _) => None,
-        (Some(_), Some(name)) => Some(variable::ratio_db(table, name)?),
-        (Some(_), None) => return Err(super::NO_RATIO.to_owned()),
-    };
-    let is_mean = velocity == OWN;
-    let velocity = table.column(velocity).unwrap_or_default();
-    let sweep = table.column("sweep").or_else(|| table.column("scan"));
-    let flagged = table.column("flagged");
-    let count = table.column("count").filter(|_| is_mean);
-    let mut sweeps: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
-    let mut without_elevation = 0;
-    for (row, cells) in table.rows.iter().enumerate() {
-        let refuse = |reason: &str| Err(format!("row {}: {reason}", row + 1));
-        let number = |column: usize| table.number(row, column);
-        let single = |value: f64| {
-            if is_own {
-                f64::from(value as f32)
-            } else {
-                value
+impl<'t> Columns<'t> {
+    fn new(table: &'t TextTable, format: &'t ScanFormat, is_own: bool) -> Result<Self, String> {
+        let velocity = match &format.field {
+            Some(name) => {
+                let column = table.column(name).ok_or_else(|| {
+                    format!(
+                        "it has no column {name}, which --field names; it has {}",
+                        column_names(table)
+                    )
+                })?;
+                table.header[column].as_str()
             }
+            None => needed_column(table, &VELOCITY, "velocity_m_s")?,
         };
-        let sweep = sweep.map_or(0.0, number);
-        if !(sweep >= 0.0 && sweep.fract() == 0.0) {
-            return refuse("sweep is no whole number");
-        }
-        if is_missing(&cells[elevation]) {
-            without_elevation += 1;
-            continue;
-        }
-        let range_m = single(ranges_m[row]);
-        let elevation_rad = elevations_rad[row];
-        if !(range_m.is_finite() && elevation_rad.is_finite()) {
-            return refuse("its range or elevation is no number");
-        }
-        let velocity_m_s = single(velocities_m_s[row]);
-        if velocity_m_s.is_nan() && !is_missing(&cells[velocity]) {
-            return refuse("its velocity is no number; an empty cell is a missing one");
-        }
-        let is_noise = ratios_db
-            .as_ref()
-            .is_some_and(|ratios_db| format.is_noise(ratios_db[row]))
-            || flagged.is_some_and(|c| number(c) > 0.5);
-        sweeps.entry(sweep as u64).or_default().push(Row {
-            number: row + 1,
+        let range = needed_column(table, &RANGE, "range_m")?;
+        let range_m = variable::values(table, range, Quantity::Length)?;
+        let (elevation, elevation_rad) = variable::elevations_rad(table)?
+            .ok_or_else(|| missing_column(table, "elevation_rad"))?;
+        let velocity_m_s = variable::values(table, velocity, Quantity::Velocity)?;
+        let azimuth_rad = optional_column(table, &AZIMUTH, Quantity::Angle)?;
+        let sigma_m_s = optional_column(table, &SIGMA, Quantity::Velocity)?;
+        let times = variable::times(table, table.rows.len())?;
+        let ratio_db = match (format.min_snr_db, variable::find(table, &RATIO)) {
+            (None, _) => None,
+            (Some(_), Some(name)) => Some(variable::ratio_db(table, name)?),
+            (Some(_), None) => return Err(super::NO_RATIO.to_owned()),
+        };
+        let is_mean = velocity == OWN;
+        Ok(Self {
+            table,
+            format,
+            is_own,
+            velocity: table.column(velocity).unwrap_or_default(),
+            elevation: table.column(elevation).unwrap_or_default(),
+            sweep: table.column("sweep").or_else(|| table.column("scan")),
+            flagged: table.column("flagged"),
+            count: table.column("count").filter(|_| is_mean),
             range_m,
-            elevation_rad: match is_own {
-                true => f64::from(elevation_rad.to_degrees() as f32).to_radians(),
-                false => elevation_rad,
-            },
-            azimuth_rad: azimuths_rad.as_ref().map_or(f64::NAN, |all| all[row]),
-            time_s: times.time_s[row],
-            velocity_m_s: if is_noise {
-                f64::NAN
-            } else {
-                format.sign() * velocity_m_s
-            },
-            sigma_m_s: sigmas_m_s
-                .as_ref()
-                .map(|all| of_mean(single(all[row]), count.map(number))),
-            count: count.map_or(f64::NAN, number),
-        });
+            elevation_rad,
+            velocity_m_s,
+            azimuth_rad,
+            sigma_m_s,
+            ratio_db,
+            times,
+        })
     }
-    Ok(Rows {
-        sweeps,
-        times,
-        without_elevation,
-    })
+
+    /// Number of the sweep of a row; 0 in a table without sweeps.
+    fn sweep(&self, row: usize) -> Result<u64, String> {
+        let sweep = self
+            .sweep
+            .map_or(0.0, |column| self.table.number(row, column));
+        match sweep >= 0.0 && sweep.fract() == 0.0 {
+            true => Ok(sweep as u64),
+            false => Err(format!("row {}: sweep is no whole number", row + 1)),
+        }
+    }
+
+    /// The velocity of a row; none of a row without an elevation. Numbers of this program's maps have the digits of their NetCDF
+    /// files, single precision and angles in degrees, so that a fit gives the same result for both.
+    fn velocity(&self, row: usize) -> Result<Option<TableVelocity>, String> {
+        let number = row + 1;
+        let cells = &self.table.rows[row];
+        if is_missing(&cells[self.elevation]) {
+            return Ok(None);
+        }
+        let range_m = self.rounded(self.range_m[row]);
+        let mut elevation_rad = self.elevation_rad[row];
+        if !(range_m.is_finite() && elevation_rad.is_finite()) {
+            return Err(format!("row {number}: its range or elevation is no number"));
+        }
+        if self.is_own {
+            elevation_rad = f64::from(elevation_rad.to_degrees() as f32).to_radians();
+        }
+        let velocity_m_s = self.rounded(self.velocity_m_s[row]);
+        if velocity_m_s.is_nan() && !is_missing(&cells[self.velocity]) {
+            return Err(format!(
+                "row {number}: its velocity is no number; an empty cell is a missing one"
+            ));
+        }
+        let count = self.count.map(|column| self.table.number(row, column));
+        let sigma_m_s = self.sigma_m_s.as_ref();
+        Ok(Some(TableVelocity {
+            row: number,
+            range_m,
+            elevation_rad,
+            azimuth_rad: self.azimuth_rad.as_ref().map_or(f64::NAN, |all| all[row]),
+            time_s: self.times.time_s[row],
+            velocity_m_s: match self.is_noise(row) {
+                true => f64::NAN,
+                false => self.format.sign() * velocity_m_s,
+            },
+            sigma_m_s: sigma_m_s.map(|all| of_mean(self.rounded(all[row]), count)),
+            count: count.unwrap_or(f64::NAN),
+        }))
+    }
+
+    /// A number with the digits of this program's NetCDF files, in a table of this program.
+    fn rounded(&self, value: f64) -> f64 {
+        match self.is_own {
+            true => f64::from(value as f32),
+            false => value,
+        }
+    }
+
+    /// Whether the velocity of a row is noise: by its signal-to-noise ratio, or by its flag.
+    fn is_noise(&self, row: usize) -> bool {
+        if let Some(ratio_db) = &self.ratio_db
+            && self.format.is_noise(ratio_db[row])
+        {
+            return true;
+        }
+        self.flagged
+            .is_some_and(|column| self.table.number(row, column) > 0.5)
+    }
+}
+
+/// The column that is known by one of these names.
+fn needed_column<'t>(
+    table: &'t TextTable,
+    known: &VariableNames,
+    name: &str,
+) -> Result<&'t str, String> {
+    variable::find(table, known).ok_or_else(|| missing_column(table, name))
+}
+
+fn missing_column(table: &TextTable, name: &str) -> String {
+    format!(
+        "it has no column {name}: range_m, elevation_rad (or elevation_deg), velocity_m_s and, if known, time_s and sigma_m_s are \
+         read, or other units in their names; it has {}",
+        column_names(table)
+    )
+}
+
+/// Values of a column that need not be there, in SI.
+fn optional_column(
+    table: &TextTable,
+    known: &VariableNames,
+    quantity: Quantity,
+) -> Result<Option<Vec<f64>>, String> {
+    match variable::find(table, known) {
+        Some(name) => variable::values(table, name, quantity).map(Some),
+        None => Ok(None),
+    }
 }
 
 /// Whether a cell says that there is no number.
@@ -198,28 +258,24 @@ fn is_missing(cell: &str) -> bool {
 }
 
 /// The names of the first columns of a table.
-fn columns(table: &TextTable) -> String {
+fn column_names(table: &TextTable) -> String {
     let names = table.header.iter().take(8).map(|name| quoted(name));
     names.collect::<Vec<_>>().join(", ")
 }
 
 /// The rays of one sweep on the ranges of all, in the order in which they first come.
-fn grid(rows: &[Row]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
-    let range_m = axis(rows.iter().map(|row| row.range_m));
-    let elevation_rad = axis(rows.iter().map(|row| row.elevation_rad));
+fn grid(rows: &[TableVelocity]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
+    let range_m = axis(rows.iter().map(|row| row.range_m).collect());
+    let elevation_rad = axis(rows.iter().map(|row| row.elevation_rad).collect());
     let gates = range_m.len();
     let mut lines: BTreeMap<(usize, u64), usize> = BTreeMap::new();
-    let line_of: Vec<usize> = rows
-        .iter()
-        .map(|row| {
-            let direction = (
-                nearest(&elevation_rad, row.elevation_rad),
-                row.azimuth_rad.to_bits(),
-            );
-            let next = lines.len();
-            *lines.entry(direction).or_insert(next)
-        })
-        .collect();
+    let mut line_of_row = Vec::with_capacity(rows.len());
+    for row in rows {
+        let elevation = nearest(&elevation_rad, row.elevation_rad);
+        let next = lines.len();
+        let line = lines.entry((elevation, row.azimuth_rad.to_bits()));
+        line_of_row.push(*line.or_insert(next));
+    }
     let lines = lines.len();
     if gates * lines > 10 * rows.len() + 1000 {
         return Err(format!(
@@ -241,12 +297,12 @@ fn grid(rows: &[Row]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
     };
     let mut rays = vec![empty; lines];
     let mut seen = vec![false; gates * lines];
-    for (row, line) in rows.iter().zip(line_of) {
+    for (row, line) in rows.iter().zip(line_of_row) {
         let gate = nearest(&range_m, row.range_m);
         if std::mem::replace(&mut seen[line * gates + gate], true) {
             return Err(format!(
                 "row {}: range {} m at elevation {} rad is there twice: a column sweep tells scans apart",
-                row.number, row.range_m, row.elevation_rad
+                row.row, row.range_m, row.elevation_rad
             ));
         }
         let ray = &mut rays[line];
@@ -264,8 +320,7 @@ fn grid(rows: &[Row]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
 }
 
 /// Different values, increasing; those that rounding alone sets apart are one.
-fn axis(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut all: Vec<f64> = values.collect();
+fn axis(mut all: Vec<f64>) -> Vec<f64> {
     all.sort_by(f64::total_cmp);
     all.dedup();
     let step = match (all.first(), all.last()) {
