@@ -144,64 +144,71 @@ impl FlowCase {
         );
         self.check_limits("", &mut p);
         self.case.check(&mut p);
-        let t = self.time;
-        let o = &self.output;
-        let c = self.checkpoint;
-        let mut absent = |is_wrong: bool, key: &str, value: &dyn Debug, allowed: &str| {
-            p.require(!is_wrong, key, value, format!("absent{allowed}"));
-        };
-        if let Some(step_s) = t.step_s {
-            let is_controlled = t.courant.is_some() || t.longest_step_s.is_some();
-            absent(
-                is_controlled,
-                "time.step_s",
-                &step_s,
-                " where a Courant number or a longest step is given",
-            );
-        }
-        if let Some(every_s) = o.every_s {
-            absent(
-                !o.times_s.is_empty(),
-                "output.every_s",
-                &every_s,
-                " beside output.times_s",
-            );
-        }
-        if let Some(every_s) = c.every_s {
-            absent(
-                c.every_steps.is_some(),
-                "checkpoint.every_s",
-                &every_s,
-                " beside checkpoint.every_steps",
-            );
-        }
-        let is_wake = matches!(self.case, CaseKind::Wake(_));
-        let has_times = !o.times_s.is_empty() || o.every_s.is_some();
-        let by_age = ", like output.every_s: the section wake has the ages";
-        absent(is_wake && has_times, "output.times_s", &o.times_s, by_age);
-        absent(
-            is_wake && !o.planes_x_m.is_empty(),
-            "output.planes_x_m",
-            &o.planes_x_m,
-            ": see wake.planes_x",
-        );
+        self.check_exclusive(&mut p);
         if let Some(wake) = &self.wake {
-            absent(
-                !is_wake,
-                "wake.end_tau",
-                &wake.end_tau,
-                ": the section is for case.kind = \"wake\"",
-            );
             wake.check(&mut p);
         }
-        let initial = o.planes.contains(&FileFormat::InitialNetcdf);
+        let planes = &self.output.planes;
         p.require(
-            !initial,
+            !planes.contains(&FileFormat::InitialNetcdf),
             "output.planes",
-            &o.planes,
+            planes,
             "netcdf: an initial field is a whole field",
         );
         p.into_problems()
+    }
+
+    /// Refuses keys beside others that they exclude.
+    fn check_exclusive(&self, p: &mut Checker<'_>) {
+        let time = &self.time;
+        let output = &self.output;
+        let checkpoint = &self.checkpoint;
+        if let Some(step_s) = time.step_s {
+            p.require(
+                time.courant.is_none() && time.longest_step_s.is_none(),
+                "time.step_s",
+                step_s,
+                "absent where a Courant number or a longest step is given",
+            );
+        }
+        if let Some(every_s) = output.every_s {
+            p.require(
+                output.times_s.is_empty(),
+                "output.every_s",
+                every_s,
+                "absent beside output.times_s",
+            );
+        }
+        if let Some(every_s) = checkpoint.every_s {
+            p.require(
+                checkpoint.every_steps.is_none(),
+                "checkpoint.every_s",
+                every_s,
+                "absent beside checkpoint.every_steps",
+            );
+        }
+        let is_wake = matches!(self.case, CaseKind::Wake(_));
+        let has_times = !output.times_s.is_empty() || output.every_s.is_some();
+        p.require(
+            !(is_wake && has_times),
+            "output.times_s",
+            &output.times_s,
+            "absent, like output.every_s: the section wake has the ages",
+        );
+        p.require(
+            !is_wake || output.planes_x_m.is_empty(),
+            "output.planes_x_m",
+            &output.planes_x_m,
+            "absent: see wake.planes_x",
+        );
+        if let Some(wake) = &self.wake {
+            p.require(
+                is_wake,
+                "wake.end_tau",
+                wake.end_tau,
+                "absent: the section is for case.kind = \"wake\"",
+            );
+        }
     }
 
     /// Times of the outputs of a run that ends at `end_s` \[s\].

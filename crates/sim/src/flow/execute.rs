@@ -13,7 +13,7 @@ use crate::io::lock::FolderLock;
 use crate::keys::Problem;
 use crate::progress::{Observer, Stage};
 use crate::{Error, machine};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wakescope_les::ranks::{Ranks, Single, all_gather};
 use wakescope_les::solver::{
@@ -84,7 +84,7 @@ pub fn run(
 
 /// Runs a case on ranks, all of which call this, and writes its files to `folder`, in which no other run may be writing. The
 /// files have the same bytes for any number of ranks; of fields and checkpoints each writes what it has, rank 0 the rest, and it
-/// alone tells the observer anything.
+/// alone reports to the observer.
 ///
 /// # Errors
 /// A case that the solver refuses or that needs more memory than there is, a checkpoint that does not fit, a flow that blows
@@ -111,12 +111,8 @@ pub fn run_on(
         open(folder, options.begin, &mut warnings)
     });
     let opened = agree(ranks, opened.transpose())?;
-    // From where the run goes on, rank 0 says: the number of the checkpoint, from 1, or 0.
-    let number = vec![opened.as_ref().map_or(0.0, |(_, number)| *number as f64)];
-    let number = all_gather(&**ranks, number).map_err(Error::Flow)?[0] as usize;
-    let checkpoint = number
-        .checked_sub(1)
-        .and_then(|place| checkpoint_paths(folder).into_iter().nth(place));
+    let number = opened.as_ref().map_or(0, |(_, number)| *number);
+    let checkpoint = agreed_checkpoint(ranks, folder, number)?;
     let tau_per_s = setup.tau_per_s;
     let wake = setup.wake.take();
     let (mut run, kept) = match &checkpoint {
@@ -125,18 +121,11 @@ pub fn run_on(
     };
     let reached_s = run.flow().time_s();
     let end_s = run.plan().end_s;
-    if reached_s > (1.0 + 1e-9) * end_s {
-        let reached_tau = age_tau(reached_s, tau_per_s);
-        let reason = format!(
-            "the end, {end_s:?} s, lies before {reached_s:?} s (tau = {reached_tau:?}), which the checkpoint has reached"
-        );
-        return Err(Error::Input {
-            path: file.path().to_owned(),
-            reason,
-        });
-    }
+    refuse_passed_end(file, end_s, reached_s, tau_per_s)?;
     if is_first {
-        warnings.iter().for_each(|text| observer.warn(text));
+        for text in &warnings {
+            observer.warn(text);
+        }
         observer.begin(Stage::FlowSimulation, DIVISIONS as u64);
     }
     let mut writer = Writer {
@@ -154,19 +143,62 @@ pub fn run_on(
     };
     let begun = writer.begin(file, checkpoint, &kept);
     agree(ranks, begun)?;
-    let result = run.to_end(&mut writer);
-    // Also of a run that failed: its last row is what one wants to see.
-    let finished = writer.finish();
-    let error = writer.error.take();
-    let is_complete = result.map_err(|e| error.unwrap_or(Error::Flow(e)))?;
-    agree(ranks, finished)?;
+    let is_complete = run_to_end(&mut run, &mut writer)?;
     if is_first && is_complete {
         observer.end();
     }
-    let files = writer.written;
-    let warnings = writer.warnings;
+    Ok(outcome(&run, is_complete, writer.written, writer.warnings))
+}
+
+/// The checkpoint from which a run continues: rank 0 says which, by its number from 1, or 0 for none.
+fn agreed_checkpoint(
+    ranks: &Arc<dyn Ranks>,
+    folder: &Path,
+    number: usize,
+) -> Result<Option<PathBuf>, Error> {
+    let numbers = all_gather(&**ranks, vec![number as f64]).map_err(Error::Flow)?;
+    let place = (numbers[0] as usize).checked_sub(1);
+    Ok(place.and_then(|place| checkpoint_paths(folder).into_iter().nth(place)))
+}
+
+/// Refuses an end before the time that a checkpoint has reached.
+fn refuse_passed_end(
+    file: &CaseFile,
+    end_s: f64,
+    reached_s: f64,
+    tau_per_s: f64,
+) -> Result<(), Error> {
+    if reached_s <= (1.0 + 1e-9) * end_s {
+        return Ok(());
+    }
+    let reached_tau = age_tau(reached_s, tau_per_s);
+    Err(Error::input(
+        file.path(),
+        format!(
+            "the end, {end_s:?} s, lies before {reached_s:?} s (tau = {reached_tau:?}), which the checkpoint has reached"
+        ),
+    ))
+}
+
+/// Runs a flow to its end or its pause, and completes the tables; returns whether the end is reached.
+fn run_to_end(run: &mut Run, writer: &mut Writer<'_>) -> Result<bool, Error> {
+    let result = run.to_end(writer);
+    // Also of a run that failed: its last row shows why.
+    let finished = writer.finish();
+    let error = writer.error.take();
+    let is_complete = result.map_err(|e| error.unwrap_or(Error::Flow(e)))?;
+    agree(&writer.ranks, finished)?;
+    Ok(is_complete)
+}
+
+fn outcome(
+    run: &Run,
+    is_complete: bool,
+    files: Vec<PathBuf>,
+    warnings: Vec<String>,
+) -> FlowOutcome {
     let flow = run.flow();
-    Ok(FlowOutcome {
+    FlowOutcome {
         steps: flow.steps(),
         time_s: flow.time_s(),
         is_complete,
@@ -176,7 +208,7 @@ pub fn run_on(
         relative_divergence: flow.relative_divergence(),
         files,
         warnings,
-    })
+    }
 }
 
 /// A run from the initial field of its case, and a warning where the projection takes much from that.
@@ -252,18 +284,10 @@ pub(super) fn prepare(
         .map(|bytes| bytes * machines);
     // Before the setup, which holds the initial field.
     refuse_too_large(&file.content, file.content.case.cells(), &[], available)?;
-    // What the solver refuses of a case is a matter of its file.
-    let of_file = |error: wakescope_les::Error| Error::Input {
-        path: file.path().to_owned(),
-        reason: format!("[case]: {error}"),
-    };
     let setup = Setup::new(&file.content, file.folder());
-    let mut setup = setup.map_err(|error| {
-        if let Error::Flow(error) = error {
-            of_file(error)
-        } else {
-            error
-        }
+    let mut setup = setup.map_err(|error| match error {
+        Error::Flow(error) => refused_case(file, &error),
+        error => error,
     })?;
     setup.settings.ranks = ranks.clone();
     let dense = setup.settings.pressure.dense_directions(&setup.mesh);
@@ -273,7 +297,7 @@ pub(super) fn prepare(
         .validate(&setup.mesh)
         .map_err(|error| match error {
             wakescope_les::Error::TooManyRanks { .. } => Error::Flow(error),
-            error => of_file(error),
+            error => refused_case(file, &error),
         })?;
     if options.begin != Begin::Restart {
         refuse_unstable(file, &setup)?;
@@ -289,6 +313,11 @@ pub(super) fn prepare(
     Ok((setup, plan, files, forecast))
 }
 
+/// What the solver refuses of a case, as an error of its file.
+fn refused_case(file: &CaseFile, error: &wakescope_les::Error) -> Error {
+    Error::input(file.path(), format!("[case]: {error}"))
+}
+
 /// Refuses a step that the run would refuse at its start.
 fn refuse_unstable(file: &CaseFile, setup: &Setup) -> Result<(), Error> {
     let stability = setup.stability();
@@ -296,18 +325,14 @@ fn refuse_unstable(file: &CaseFile, setup: &Setup) -> Result<(), Error> {
     let Some(limit) = stability.refused(step_s) else {
         return Ok(());
     };
-    let allowed = |most: f64| {
-        format!(
-            "at most {most:.4} with this scheme, mesh and viscosity: beyond a Courant number of {limit:.3} waves of the mesh grow"
-        )
+    let (key, value, most) = match setup.settings.time_step {
+        TimeStep::Fixed { .. } => ("time.step_s", step_s, limit / stability.courant_per_s()),
+        TimeStep::Courant { courant, .. } => ("time.courant", courant, limit),
     };
-    let courant_per_s = stability.courant_per_s();
-    Err(match setup.settings.time_step {
-        TimeStep::Fixed { .. } => {
-            file.refuse("time.step_s", step_s, allowed(limit / courant_per_s))
-        }
-        TimeStep::Courant { courant, .. } => file.refuse("time.courant", courant, allowed(limit)),
-    })
+    let allowed = format!(
+        "at most {most:.4} with this scheme, mesh and viscosity: beyond a Courant number of {limit:.3} waves of the mesh grow"
+    );
+    Err(file.refuse(key, value, allowed))
 }
 
 /// The run of a checkpoint. Which scheme suits a flow depends on the step, which may be changed: where the case does not name
@@ -318,21 +343,16 @@ fn resume(
     plan: RunPlan,
     case: &FlowCase,
 ) -> Result<(Run, Vec<u8>), Error> {
-    let try_with = |setup: &Setup| {
-        Run::resume(
-            path,
-            setup.mesh.clone(),
-            setup.settings.clone(),
-            plan.clone(),
-        )
-    };
-    let resumed = match try_with(&setup) {
+    let mesh = setup.mesh.clone();
+    let settings = setup.settings.clone();
+    let resumed = match Run::resume(path, mesh, settings, plan.clone()) {
         Err(wakescope_les::Error::CheckpointMismatch { what, .. })
             if what == "the time scheme" && case.time.scheme.is_none() =>
         {
-            try_with(&setup.with_other_scheme(case))
+            let other = setup.with_other_scheme(case);
+            Run::resume(path, other.mesh, other.settings, plan)
         }
-        other => other,
+        resumed => resumed,
     };
     resumed.map_err(Error::Flow)
 }
@@ -340,20 +360,7 @@ fn resume(
 /// The plan of the run and of its files, with all that can be refused before the computing.
 fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files), Error> {
     let case = &file.content;
-    let wake_end_s = case
-        .wake
-        .as_ref()
-        .map(|wake| wake.end_tau / setup.tau_per_s);
-    let Some(end_s) = case.time.end_s.or(wake_end_s).or(setup.end_s) else {
-        let allowed =
-            "a number in s, e.g. 30.0, is required for a flow with kind = \"free\"".into();
-        let problem = Problem {
-            key: "time.end_s".into(),
-            value: Problem::ABSENT.into(),
-            allowed,
-        };
-        return Err(Error::Scene(file.located(vec![problem])));
-    };
+    let end_s = end_s(file, setup)?;
     let mut output = case.output.clone();
     let schedule = match (&case.wake, &setup.wake) {
         (Some(wake), Some(WakeSetup { scales, .. })) => {
@@ -373,10 +380,11 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
         ));
     }
     let along = &setup.mesh.directions()[0];
-    let inside = |x: &f64| along.ends == Ends::Periodic || (along.low_m..=along.high_m).contains(x);
-    if let Some(bad) = case.output.planes_x_m.iter().find(|x| !inside(x)) {
-        let allowed = format!("within the mesh, {:?} to {:?} m", along.low_m, along.high_m);
-        return Err(file.refuse("output.planes_x_m", bad, allowed));
+    for x_m in &case.output.planes_x_m {
+        if along.ends != Ends::Periodic && !(along.low_m..=along.high_m).contains(x_m) {
+            let allowed = format!("within the mesh, {:?} to {:?} m", along.low_m, along.high_m);
+            return Err(file.refuse("output.planes_x_m", x_m, allowed));
+        }
     }
     let every = match (case.checkpoint.every_steps, case.checkpoint.every_s) {
         (Some(steps), _) => Interval::Steps(steps),
@@ -403,6 +411,22 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
         title: format!("Simulated flow, case {}", file.hash),
     };
     Ok((run, files))
+}
+
+/// End of the run, s: that of the case, of its wake, or of its flow.
+fn end_s(file: &CaseFile, setup: &Setup) -> Result<f64, Error> {
+    let case = &file.content;
+    let wake = case.wake.as_ref();
+    let wake_end_s = wake.map(|wake| wake.end_tau / setup.tau_per_s);
+    let end_s = case.time.end_s.or(wake_end_s).or(setup.end_s);
+    end_s.ok_or_else(|| {
+        let problem = Problem {
+            key: "time.end_s".into(),
+            value: Problem::ABSENT.into(),
+            allowed: "a number in s, e.g. 30.0, is required for a flow with kind = \"free\"".into(),
+        };
+        Error::Scene(file.located(vec![problem]))
+    })
 }
 
 #[cfg(test)]

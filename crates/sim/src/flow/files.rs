@@ -145,49 +145,27 @@ impl Files {
         let [nx, ny, nz] = cells.map(|n| n as f64);
         let variables = if self.is_wake { 5.0 } else { 4.0 };
         let mut out: Vec<FileForecast> = Vec::new();
-        let mut add = |name: &str, count: usize, bytes: f64| match out
-            .iter_mut()
-            .find(|kind| kind.name == name)
-        {
-            Some(kind) => (kind.count, kind.bytes) = (kind.count + count, kind.bytes + bytes),
-            None if count > 0 => out.push(FileForecast {
-                name: name.into(),
-                count,
-                bytes,
-            }),
-            None => {}
-        };
-        let (planes, fields): (Vec<_>, Vec<_>) =
+        let (planes, mut files): (Vec<_>, Vec<_>) =
             self.of_outputs().partition(|file| file.plane.is_some());
-        for file in fields.into_iter().chain(planes) {
+        files.extend(planes);
+        for file in files {
             let stem = if file.plane.is_some() {
                 "plane*"
             } else {
                 &file.stem
             };
-            add(
-                &format!("{stem}_*.nc"),
-                1,
-                file.bytes(nx * ny * nz, ny * nz, variables),
-            );
+            let bytes = file.bytes(nx * ny * nz, ny * nz, variables);
+            add_files(&mut out, &format!("{stem}_*.nc"), 1, bytes);
         }
-        add(
-            STEPS,
-            usize::from(self.output.steps),
-            steps * STEP_ROW_BYTES,
-        );
-        let histories = 2;
+        let tables = usize::from(self.output.steps);
+        add_files(&mut out, STEPS, tables, steps * STEP_ROW_BYTES);
+        let histories = if self.is_wake { 2 } else { 0 };
         let records = self.schedule.due.iter().filter(|due| due.record).count() as f64;
-        add(
-            "wake.*",
-            if self.is_wake { histories } else { 0 },
-            records * (RECORD_BYTES + 40.0 * nx),
-        );
-        add(
-            "flow.checkpoint*",
-            if writes_checkpoints { 2 } else { 0 },
-            2.0 * 7.0 * 8.0 * nx * ny * nz,
-        );
+        let history_bytes = records * (RECORD_BYTES + 40.0 * nx);
+        add_files(&mut out, "wake.*", histories, history_bytes);
+        let checkpoints = if writes_checkpoints { 2 } else { 0 };
+        let checkpoint_bytes = 2.0 * 7.0 * 8.0 * nx * ny * nz;
+        add_files(&mut out, "flow.checkpoint*", checkpoints, checkpoint_bytes);
         out
     }
 
@@ -205,91 +183,49 @@ impl Files {
         due: Due,
         ranks: &Arc<dyn Ranks>,
     ) -> Result<Vec<PathBuf>, Error> {
-        let is_first = ranks.rank() == 0;
-        let shown = agree(ranks, self.shown(flow, due, ranks))?;
-        let mut group = FileGroup::new(&self.folder);
-        let mut add = || {
-            for file in self.of_output(due) {
-                if let Some(parts) = self.parts(&file, &shown, is_first)? {
-                    group.add_parts(&file.name(), parts)?;
-                }
-            }
-            Ok(())
-        };
-        agree(ranks, add())?;
-        // The numbers are larger than the files.
-        drop(shown);
+        let group = agree(ranks, self.group(flow, due, ranks.rank() == 0))?;
         commit(&group, ranks)
     }
 
-    /// What is due of the flow, for which all ranks must ask together.
-    fn shown(&self, flow: &Flow, due: Due, ranks: &Arc<dyn Ranks>) -> Result<Shown, Error> {
+    /// The files that are due of the flow, which all ranks must make together: of fields what this rank has, planes whole.
+    fn group(&self, flow: &Flow, due: Due, is_first: bool) -> Result<FileGroup, Error> {
         let share = Share {
             planes: flow.own_planes(),
-            is_first: ranks.rank() == 0,
+            is_first,
         };
-        let wants = |of: &dyn Fn(&FileFormat) -> bool| {
-            due.fields.is_some() && self.output.fields.iter().any(of)
-        };
-        let initial = |format: &FileFormat| *format == FileFormat::InitialNetcdf;
-        let field = if wants(&|format| !initial(format)) {
-            Some(self.field(flow, share.clone())?)
-        } else {
-            None
-        };
-        let xs_m: &[f64] = if due.planes.is_some() {
-            &self.output.planes_x_m
-        } else {
-            &[]
-        };
-        let planes = xs_m
-            .iter()
-            .map(|x_m| self.plane(flow, *x_m))
-            .collect::<Result<_, _>>()?;
-        Ok(Shown {
-            field,
-            faces: if wants(&initial) {
-                Some(self.faces(flow, share)?)
-            } else {
-                None
-            },
-            planes,
-        })
-    }
-
-    /// What this rank has of a file; none where the field is not at hand.
-    fn parts(
-        &self,
-        file: &OutputFile,
-        shown: &Shown,
-        is_first: bool,
-    ) -> Result<Option<FileParts>, Error> {
-        let origin = &self.origin;
-        Ok(match (file.plane, file.format, &shown.field) {
-            (None, FileFormat::Netcdf, Some(field)) => {
-                Some(cf_fields::cf_field_parts(field, origin)?)
-            }
-            (None, FileFormat::InitialNetcdf, _) => shown
-                .faces
-                .as_ref()
-                .map(|faces| cf_fields::cf_faces_parts(faces, origin))
-                .transpose()?,
-            (Some(at), FileFormat::Netcdf, _) => Some(of_first(
-                cf_planes_bytes(&shown.planes[at], origin)?,
-                is_first,
-            )),
-            _ => None,
-        })
+        let mut group = FileGroup::new(&self.folder);
+        for file in self.of_output(due) {
+            let parts = match (file.plane, file.format) {
+                (None, FileFormat::Netcdf) => {
+                    let field = self.field(flow, share.clone())?;
+                    cf_fields::cf_field_parts(&field, &self.origin)?
+                }
+                (None, FileFormat::InitialNetcdf) => {
+                    let faces = self.faces(flow, share.clone())?;
+                    cf_fields::cf_faces_parts(&faces, &self.origin)?
+                }
+                (Some(plane), FileFormat::Netcdf) => {
+                    let plane = self.plane(flow, self.output.planes_x_m[plane])?;
+                    of_first(cf_planes_bytes(&plane, &self.origin)?, is_first)
+                }
+                // Planes are no initial fields: the case refuses them.
+                (Some(_), FileFormat::InitialNetcdf) => continue,
+            };
+            group.add_parts(&file.name(), parts)?;
+        }
+        Ok(group)
     }
 
     fn field(&self, flow: &Flow, share: Share) -> Result<VelocityField, Error> {
         let mesh = flow.mesh();
-        let velocity = |axis| flow.own_centre_velocity_m_s(axis).map_err(Error::Flow);
         let vorticity_per_s = if self.is_wake {
             Some(flow.own_vorticity_magnitude_per_s().map_err(Error::Flow)?)
         } else {
             None
         };
+        let u_m_s = flow.own_centre_velocity_m_s(0).map_err(Error::Flow)?;
+        let v_m_s = flow.own_centre_velocity_m_s(1).map_err(Error::Flow)?;
+        let w_m_s = flow.own_centre_velocity_m_s(2).map_err(Error::Flow)?;
         Ok(VelocityField {
             title: self.title.clone(),
             time_s: flow.time_s(),
@@ -300,7 +236,7 @@ impl Files {
                 let along = &mesh.directions()[axis];
                 (along.ends == Ends::Periodic).then(|| along.length_m())
             }),
-            velocity_m_s: [velocity(0)?, velocity(1)?, velocity(2)?],
+            velocity_m_s: [u_m_s, v_m_s, w_m_s],
             pressure_m2_s2: flow.own_pressure_m2_s2().map_err(Error::Flow)?,
             vorticity_per_s,
             share,
@@ -309,7 +245,9 @@ impl Files {
 
     fn faces(&self, flow: &Flow, share: Share) -> Result<cf_fields::FaceVelocities, Error> {
         let mesh = flow.mesh();
-        let velocity = |axis| flow.own_face_velocity_m_s(axis).map_err(Error::Flow);
+        let u_m_s = flow.own_face_velocity_m_s(0).map_err(Error::Flow)?;
+        let v_m_s = flow.own_face_velocity_m_s(1).map_err(Error::Flow)?;
+        let w_m_s = flow.own_face_velocity_m_s(2).map_err(Error::Flow)?;
         Ok(cf_fields::FaceVelocities {
             title: self.title.clone(),
             time_s: flow.time_s(),
@@ -319,7 +257,7 @@ impl Files {
                 faces_m.pop();
                 faces_m
             }),
-            velocity_m_s: [velocity(0)?, velocity(1)?, velocity(2)?],
+            velocity_m_s: [u_m_s, v_m_s, w_m_s],
             share,
         })
     }
@@ -327,22 +265,29 @@ impl Files {
     fn plane(&self, flow: &Flow, x_m: f64) -> Result<CrossPlanes, Error> {
         let plane = flow.cross_plane(x_m).map_err(Error::Flow)?;
         let shape = (1, plane.z_m.len(), plane.y_m.len());
-        let component = |c: usize| {
-            let values = plane.velocity_m_s.iter().map(|v| v[c]).collect();
-            Array3::from_shape_vec(shape, values).unwrap_or_else(|_| Array3::zeros(shape))
-        };
+        let mut v_m_s = Vec::with_capacity(plane.velocity_m_s.len());
+        let mut w_m_s = Vec::with_capacity(plane.velocity_m_s.len());
+        for velocity_m_s in &plane.velocity_m_s {
+            v_m_s.push(velocity_m_s[1]);
+            w_m_s.push(velocity_m_s[2]);
+        }
         Ok(CrossPlanes {
             title: format!("{}, plane at x = {x_m} m", self.title),
             tau: vec![super::age_tau(flow.time_s(), self.tau_per_s)],
             time_s: vec![flow.time_s()],
-            v_m_s: component(1),
-            w_m_s: component(2),
+            v_m_s: in_one_plane(shape, v_m_s),
+            w_m_s: in_one_plane(shape, w_m_s),
             y_m: plane.y_m,
             z_m: plane.z_m,
             y_edges: plane.y_edges,
             z_edges: plane.z_edges,
         })
     }
+}
+
+/// Values of one plane; zeros if their number differs from the shape.
+fn in_one_plane(shape: (usize, usize, usize), values: Vec<f64>) -> Array3<f64> {
+    Array3::from_shape_vec(shape, values).unwrap_or_else(|_| Array3::zeros(shape))
 }
 
 /// A file that all ranks have whole: the first one writes it.
@@ -358,13 +303,21 @@ fn of_first(bytes: Vec<u8>, is_first: bool) -> FileParts {
     }
 }
 
-/// What is due of a flow: of fields what this rank has, planes whole.
-struct Shown {
-    field: Option<VelocityField>,
-    faces: Option<cf_fields::FaceVelocities>,
-    planes: Vec<CrossPlanes>,
+/// Adds files to those of the same name, or as a new kind.
+fn add_files(kinds: &mut Vec<FileForecast>, name: &str, count: usize, bytes: f64) {
+    match kinds.iter_mut().find(|kind| kind.name == name) {
+        Some(kind) => {
+            kind.count += count;
+            kind.bytes += bytes;
+        }
+        None if count > 0 => kinds.push(FileForecast {
+            name: name.into(),
+            count,
+            bytes,
+        }),
+        None => {}
+    }
 }
-
 /// An error of one rank is that of all.
 pub(super) fn agree<T>(ranks: &Arc<dyn Ranks>, result: Result<T, Error>) -> Result<T, Error> {
     ranks::all_agree(&**ranks, result, Error::Flow)
@@ -385,11 +338,8 @@ fn commit(group: &FileGroup, ranks: &Arc<dyn Ranks>) -> Result<Vec<PathBuf>, Err
     let name = stage.as_ref().map_or_else(Vec::new, |stage| {
         stage.name().bytes().map(f64::from).collect()
     });
-    let name: Vec<u8> = all_gather(&**ranks, name)
-        .map_err(Error::Flow)?
-        .iter()
-        .map(|byte| *byte as u8)
-        .collect();
+    let name = all_gather(&**ranks, name).map_err(Error::Flow)?;
+    let name: Vec<u8> = name.into_iter().map(|byte| byte as u8).collect();
     agree(
         ranks,
         group

@@ -8,7 +8,7 @@
 
 use super::case::{FlowCase, Subgrid};
 use super::files::{FileForecast, Files};
-use super::setup::Setup;
+use super::setup::{Setup, WakeSetup};
 use super::{CaseFile, CaseKind, InitialName, WakeOutput};
 use crate::keys::Declared as _;
 use crate::quantities::{bytes, rounded, seconds};
@@ -121,23 +121,8 @@ impl FlowForecast {
         }
     }
 
-    /// Size of all files \[bytes\].
-    pub fn file_bytes(&self) -> f64 {
-        self.files.iter().map(|kind| kind.bytes).sum()
-    }
-}
-
-impl fmt::Display for FlowForecast {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [nx, ny, nz] = self.cells;
-        writeln!(f, "case {}", self.case_hash)?;
-        writeln!(f, "  cells    {nx} x {ny} x {nz} = {}", count(self.cells))?;
-        let age = if self.end_tau == self.end_s {
-            String::new()
-        } else {
-            format!(", tau = {:?}", rounded(self.end_tau, 5))
-        };
-        writeln!(f, "  end      t = {:?} s{age}", rounded(self.end_s, 5))?;
+    /// Writes the steps, the scheme and the Courant number.
+    fn fmt_steps(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let scheme = if self.scheme == TimeScheme::RungeKutta3 {
             "runge_kutta3"
         } else {
@@ -160,25 +145,36 @@ impl fmt::Display for FlowForecast {
                 "  courant  {courant:.3}, all waves of the mesh decay up to {damped:.3}"
             )?;
         }
-        writeln!(
-            f,
-            "  time     about {} on one core",
-            seconds(self.core_s + self.program_s)
-        )?;
+        Ok(())
+    }
+
+    /// Size of all files \[bytes\].
+    pub fn file_bytes(&self) -> f64 {
+        self.files.iter().map(|kind| kind.bytes).sum()
+    }
+}
+
+impl fmt::Display for FlowForecast {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [nx, ny, nz] = self.cells;
+        writeln!(f, "case {}", self.case_hash)?;
+        writeln!(f, "  cells    {nx} x {ny} x {nz} = {}", count(self.cells))?;
+        let age = if self.end_tau == self.end_s {
+            String::new()
+        } else {
+            format!(", tau = {:?}", rounded(self.end_tau, 5))
+        };
+        writeln!(f, "  end      t = {:?} s{age}", rounded(self.end_s, 5))?;
+        self.fmt_steps(f)?;
+        let time = seconds(self.core_s + self.program_s);
+        writeln!(f, "  time     about {time} on one core")?;
         let available = machine::available_memory_bytes()
             .map_or(String::new(), |b| format!(" of {}", bytes(b)));
-        writeln!(
-            f,
-            "  memory   about {}{available}",
-            bytes(self.memory_bytes)
-        )?;
+        let memory = bytes(self.memory_bytes);
+        writeln!(f, "  memory   about {memory}{available}")?;
         if self.ranks > 1 {
-            writeln!(
-                f,
-                "  ranks    {}, each about {}",
-                self.ranks,
-                bytes(self.rank_bytes)
-            )?;
+            let memory = bytes(self.rank_bytes);
+            writeln!(f, "  ranks    {}, each about {memory}", self.ranks)?;
         }
         writeln!(f, "  files    about {}", bytes(self.file_bytes()))?;
         for kind in &self.files {
@@ -213,19 +209,28 @@ fn notes(case: &FlowCase, stability: &Stability, step_s: f64) -> Vec<String> {
 /// fastest: their radius squared grows by `4 nu t`, and their largest speed, `b0/(2 r) V0`, falls beside the `V0` that each vortex
 /// gets from the other.
 fn steps_to(end_s: f64, first_s: f64, setup: &Setup) -> f64 {
-    let (Some(wake), TimeStep::Courant { longest_s, .. }) = (&setup.wake, setup.settings.time_step)
-    else {
+    let TimeStep::Courant { longest_s, .. } = setup.settings.time_step else {
         return end_s / first_s;
     };
-    let speed = |time_s: f64| {
-        let radius_m =
-            (wake.core_radius_m.powi(2) + 4.0 * setup.settings.viscosity_m2_s * time_s).sqrt();
-        1.0 + 0.5 * wake.scales.spacing_m / radius_m
+    let Some(wake) = &setup.wake else {
+        return end_s / first_s;
     };
+    let viscosity_m2_s = setup.settings.viscosity_m2_s;
+    let speed_at_start = core_speed(wake, viscosity_m2_s, 0.0);
     let part_s = end_s / SPREADING_PARTS as f64;
-    let step_s =
-        |part: usize| (first_s * speed(0.0) / speed((part as f64 + 0.5) * part_s)).min(longest_s);
-    (0..SPREADING_PARTS).map(|part| part_s / step_s(part)).sum()
+    let mut steps = 0.0;
+    for part in 0..SPREADING_PARTS {
+        let speed = core_speed(wake, viscosity_m2_s, (part as f64 + 0.5) * part_s);
+        let step_s = (first_s * speed_at_start / speed).min(longest_s);
+        steps += part_s / step_s;
+    }
+    steps
+}
+
+/// Largest speed of the air of a pair at a time over the speed of its descent.
+fn core_speed(wake: &WakeSetup, viscosity_m2_s: f64, time_s: f64) -> f64 {
+    let radius_m = (wake.core_radius_m.powi(2) + 4.0 * viscosity_m2_s * time_s).sqrt();
+    1.0 + 0.5 * wake.scales.spacing_m / radius_m
 }
 
 /// Refuses a case whose fields and matrices do not fit into `available_bytes`.

@@ -113,63 +113,30 @@ keys! {
     }
 }
 
+impl EndName {
+    /// The wall at this end; no-slip walls move with a velocity.
+    fn wall(self, velocity_m_s: [f64; 3]) -> Wall {
+        match self {
+            Self::NoSlip => Wall::NoSlip { velocity_m_s },
+            Self::Slip | Self::Periodic => Wall::Slip,
+        }
+    }
+}
+
 impl Axis {
     fn check(&self, name: &str, p: &mut Checker<'_>) {
-        let key = |field: &str| format!("case.{name}.{field}");
         let ordered = self.low_m.is_finite() && self.high_m.is_finite() && self.high_m > self.low_m;
-        p.require(ordered, &key("high_m"), self.high_m, "finite, above low_m");
-        match self.mapping {
-            Spread::Uniform => {
-                p.require(
-                    self.stretch == 0.0,
-                    &key("stretch"),
-                    self.stretch,
-                    "0 for equal cells; name a mapping",
-                );
-            }
-            Spread::Sine => {
-                p.require(
-                    self.stretch.abs() < 1.0,
-                    &key("stretch"),
-                    self.stretch,
-                    "between -1 and 1 for a sine",
-                );
-            }
-            _ => {
-                let ok = self.stretch > 0.0 && self.stretch <= 20.0;
-                p.require(
-                    ok,
-                    &key("stretch"),
-                    self.stretch,
-                    "above 0 and at most 20 for this mapping",
-                );
-            }
-        }
-        let place = self
-            .place
-            .is_none_or(|place| (0.0..=1.0).contains(&place) && self.mapping == Spread::Cluster);
         p.require(
-            place,
-            &key("place"),
-            self.place,
-            "a fraction of the length, 0 to 1, and only with mapping = \"cluster\"",
+            ordered,
+            &format!("case.{name}.high_m"),
+            self.high_m,
+            "finite, above low_m",
         );
-        let periodic = [self.low_end, self.high_end].map(|end| end == EndName::Periodic);
-        let repeats = matches!(
-            self.mapping,
-            Spread::Uniform | Spread::Sine | Spread::Cluster
-        );
-        let allowed =
-            "uniform, sine or cluster in a periodic direction, and no cluster between planes";
-        let fits = if periodic[0] {
-            repeats
-        } else {
-            self.mapping != Spread::Cluster
-        };
-        p.require(fits, &key("mapping"), self.mapping, allowed);
+        self.check_mapping(name, p);
+        let is_periodic = self.low_end == EndName::Periodic;
         p.require(
-            periodic[0] == periodic[1],
-            &key("high_end"),
+            is_periodic == (self.high_end == EndName::Periodic),
+            &format!("case.{name}.high_end"),
             self.high_end,
             "periodic at both ends or at none",
         );
@@ -177,22 +144,49 @@ impl Axis {
             ("low_velocity_m_s", self.low_end, self.low_velocity_m_s),
             ("high_velocity_m_s", self.high_end, self.high_velocity_m_s),
         ] {
-            let ok = velocity.iter().all(|v| v.is_finite())
-                && (end == EndName::NoSlip || velocity == [0.0; 3]);
+            let is_finite = velocity.iter().all(|v| v.is_finite());
             p.require(
-                ok,
-                &key(field),
+                is_finite && (end == EndName::NoSlip || velocity == [0.0; 3]),
+                &format!("case.{name}.{field}"),
                 velocity,
                 "finite, and 0 where there is no no-slip wall",
             );
         }
     }
 
-    fn direction(&self) -> Direction {
-        let wall = |end: EndName, velocity_m_s: [f64; 3]| match end {
-            EndName::NoSlip => Wall::NoSlip { velocity_m_s },
-            EndName::Slip | EndName::Periodic => Wall::Slip,
+    /// Checks how the cells are spread.
+    fn check_mapping(&self, name: &str, p: &mut Checker<'_>) {
+        let (is_allowed, allowed) = match self.mapping {
+            Spread::Uniform => (self.stretch == 0.0, "0 for equal cells; name a mapping"),
+            Spread::Sine => (self.stretch.abs() < 1.0, "between -1 and 1 for a sine"),
+            _ => (
+                self.stretch > 0.0 && self.stretch <= 20.0,
+                "above 0 and at most 20 for this mapping",
+            ),
         };
+        let key = format!("case.{name}.stretch");
+        p.require(is_allowed, &key, self.stretch, allowed);
+        let is_cluster = self.mapping == Spread::Cluster;
+        p.require(
+            self.place
+                .is_none_or(|place| (0.0..=1.0).contains(&place) && is_cluster),
+            &format!("case.{name}.place"),
+            self.place,
+            "a fraction of the length, 0 to 1, and only with mapping = \"cluster\"",
+        );
+        let repeats = is_cluster || matches!(self.mapping, Spread::Uniform | Spread::Sine);
+        p.require(
+            match self.low_end {
+                EndName::Periodic => repeats,
+                _ => !is_cluster,
+            },
+            &format!("case.{name}.mapping"),
+            self.mapping,
+            "uniform, sine or cluster in a periodic direction, and no cluster between planes",
+        );
+    }
+
+    fn direction(&self) -> Direction {
         Direction {
             cells: self.cells,
             low_m: self.low_m,
@@ -204,8 +198,8 @@ impl Axis {
             ends: match self.low_end {
                 EndName::Periodic => Ends::Periodic,
                 _ => Ends::Walls {
-                    low: wall(self.low_end, self.low_velocity_m_s),
-                    high: wall(self.high_end, self.high_velocity_m_s),
+                    low: self.low_end.wall(self.low_velocity_m_s),
+                    high: self.high_end.wall(self.high_velocity_m_s),
                 },
             },
         }

@@ -10,6 +10,7 @@
 use crate::Error;
 use crate::io::netcdf_dimensions::{X, Y, Z};
 use crate::io::netcdf_input::{NetcdfFile, open};
+use std::ops::Range;
 use std::path::Path;
 use wakescope_les::solver::Ends;
 use wakescope_les::{Direction, Mesh};
@@ -23,8 +24,14 @@ type Taps = Vec<(usize, f64)>;
 /// A file that cannot be read, without the variables, or that does not cover the mesh.
 pub(super) fn read(path: &Path, mesh: &Mesh) -> Result<[Vec<f64>; 3], Error> {
     let file = open(path)?;
-    let component = |axis: usize| velocity(&file, mesh, axis).map_err(|reason| file.refuse(reason));
-    Ok([component(0)?, component(1)?, component(2)?])
+    components(&file, mesh).map_err(|reason| file.refuse(reason))
+}
+
+fn components(file: &NetcdfFile, mesh: &Mesh) -> Result<[Vec<f64>; 3], String> {
+    let u_m_s = velocity(file, mesh, 0)?;
+    let v_m_s = velocity(file, mesh, 1)?;
+    let w_m_s = velocity(file, mesh, 2)?;
+    Ok([u_m_s, v_m_s, w_m_s])
 }
 
 /// One component, brought to the faces of the mesh.
@@ -64,23 +71,15 @@ fn velocity(file: &NetcdfFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, Str
 /// The dimensions of a component along z, y, x: by what they are for, or three of any name in this order.
 fn axes(file: &NetcdfFile, name: &str) -> Result<[String; 3], String> {
     file.roles(name, [Z, Y, X]).or_else(|reason| {
-        let dims: Vec<String> = file
-            .dims(name)
-            .unwrap_or_default()
-            .into_iter()
-            .map(str::to_owned)
-            .collect();
-        let letters = |dim: &String| {
-            ["x", "y", "z", "X", "Y", "Z"]
-                .iter()
-                .any(|letter| dim.starts_with(letter))
-        };
-        // Names that say something else must not be taken for what they are not.
-        if dims.iter().any(letters) {
-            Err(reason)
-        } else {
-            dims.try_into().map_err(|_| reason)
+        let mut dims = Vec::new();
+        for dim in file.dims(name).unwrap_or_default() {
+            // Names that say something else must not be taken for what they are not.
+            if dim.starts_with(['x', 'y', 'z', 'X', 'Y', 'Z']) {
+                return Err(reason);
+            }
+            dims.push(dim.to_owned());
         }
+        dims.try_into().map_err(|_| reason)
     })
 }
 
@@ -124,45 +123,57 @@ fn taps(source_m: &[f64], target_m: &[f64], along: &Direction) -> Result<Vec<Tap
         ));
     }
     let count = n.min(4);
-    let position_m = |i: isize| {
-        let m = n as isize;
-        source_m[i.rem_euclid(m) as usize] + period_m * i.div_euclid(m) as f64
-    };
-    target_m
-        .iter()
-        .map(|&x_m| {
-            let x_m = if periodic {
-                source_m[0] + (x_m - source_m[0]).rem_euclid(period_m)
-            } else {
-                x_m
-            };
-            let outside = x_m < source_m[0] - slack_m || x_m > last_m + (last_m - source_m[n - 2]);
-            if !periodic && outside {
-                return Err(format!(
-                    "{x_m} m of the mesh is not covered by {} to {last_m} m",
-                    source_m[0]
-                ));
+    let mut all = Vec::with_capacity(target_m.len());
+    for target_m in target_m {
+        let x_m = if periodic {
+            source_m[0] + (target_m - source_m[0]).rem_euclid(period_m)
+        } else {
+            *target_m
+        };
+        let outside = x_m < source_m[0] - slack_m || x_m > last_m + (last_m - source_m[n - 2]);
+        if !periodic && outside {
+            return Err(format!(
+                "{x_m} m of the mesh is not covered by {} to {last_m} m",
+                source_m[0]
+            ));
+        }
+        let below = source_m.partition_point(|&s| s <= x_m) as isize - 1;
+        let first = if periodic {
+            below - 1
+        } else {
+            (below - 1).clamp(0, (n - count) as isize)
+        };
+        all.push(cubic(
+            source_m,
+            period_m,
+            first..first + count as isize,
+            x_m,
+        ));
+    }
+    Ok(all)
+}
+
+/// Weights at a position of the polynomial through some nodes, which go on with the period (Lagrange).
+fn cubic(source_m: &[f64], period_m: f64, nodes: Range<isize>, x_m: f64) -> Taps {
+    let n = source_m.len() as isize;
+    let mut nodes_m = Vec::with_capacity(nodes.len());
+    for node in nodes.clone() {
+        let turns = node.div_euclid(n) as f64;
+        nodes_m.push(source_m[node.rem_euclid(n) as usize] + period_m * turns);
+    }
+    let mut taps = Vec::with_capacity(nodes_m.len());
+    for (i, node) in nodes.enumerate() {
+        let mut weight = 1.0;
+        for (j, other_m) in nodes_m.iter().enumerate() {
+            if i != j {
+                weight *= (x_m - other_m) / (nodes_m[i] - other_m);
             }
-            let below = source_m.partition_point(|&s| s <= x_m) as isize - 1;
-            let first = if periodic {
-                below - 1
-            } else {
-                (below - 1).clamp(0, (n - count) as isize)
-            };
-            let nodes: Vec<isize> = (first..first + count as isize).collect();
-            Ok(nodes
-                .iter()
-                .map(|&i| {
-                    let others = nodes.iter().filter(|&&j| j != i);
-                    let weight = others
-                        .map(|&j| (x_m - position_m(j)) / (position_m(i) - position_m(j)))
-                        .product();
-                    (i.rem_euclid(n as isize) as usize, weight)
-                })
-                .filter(|&(_, weight): &(usize, f64)| weight != 0.0)
-                .collect())
-        })
-        .collect()
+        }
+        if weight != 0.0 {
+            taps.push((node.rem_euclid(n) as usize, weight));
+        }
+    }
+    taps
 }
 
 #[cfg(test)]

@@ -105,15 +105,13 @@ impl CaseFile {
                 case.output.times_s.retain(|time_s| *time_s <= end);
             }
         }
-        // The end is of the command line, whatever the file says of it.
-        let of_command = |problem: Problem| match problem.key.as_str() {
-            "time.end_s" | "wake.end_tau" => Problem {
-                key: "--end".into(),
-                ..problem
-            },
-            _ => problem,
-        };
-        let problems: Vec<Problem> = case.problems().into_iter().map(of_command).collect();
+        let mut problems = case.problems();
+        for problem in &mut problems {
+            // The end is of the command line, whatever the file says of it.
+            if ["time.end_s", "wake.end_tau"].contains(&problem.key.as_str()) {
+                problem.key = "--end".into();
+            }
+        }
         if problems.is_empty() {
             Ok(self.changed(case))
         } else {

@@ -74,12 +74,17 @@ pub(super) fn read(
 
 /// Texts with values of keys, that of the same kind first.
 fn examples_of(kind: Option<&str>) -> Vec<&'static str> {
-    let own = EXAMPLES.iter().filter(|(name, _)| Some(*name) == kind);
-    let others = EXAMPLES.iter().filter(|(name, _)| Some(*name) != kind);
-    own.chain(others)
-        .map(|(_, text)| *text)
-        .chain([MORE_EXAMPLES])
-        .collect()
+    let mut own = Vec::new();
+    let mut others = Vec::new();
+    for (name, text) in EXAMPLES {
+        match Some(name) == kind {
+            true => own.push(text),
+            false => others.push(text),
+        }
+    }
+    own.extend(others);
+    own.push(MORE_EXAMPLES);
+    own
 }
 
 /// A case of this kind as a table; empty if there is no such kind.

@@ -56,11 +56,14 @@ impl CaseFile {
     /// The same case for a history, with enough output times to compare it; nothing is written.
     fn for_history(&self, end_s: f64) -> Self {
         let mut case = self.content.clone();
-        (case.output.fields, case.output.planes) = Default::default();
-        (case.checkpoint.write, case.time.pause_after_steps) = (false, None);
+        case.output.fields.clear();
+        case.output.planes.clear();
+        case.checkpoint.write = false;
+        case.time.pause_after_steps = None;
         if let Some(wake) = &mut case.wake {
-            (wake.fields_tau, wake.planes_tau, wake.series_tau) =
-                (Some(Vec::new()), Some(Vec::new()), None);
+            wake.fields_tau = Some(Vec::new());
+            wake.planes_tau = Some(Vec::new());
+            wake.series_tau = None;
             wake.every_tau = wake.every_tau.min(wake.end_tau / TIMES);
         } else if case.output.every_s.is_none() && case.output.times_s.len() < 4 {
             case.output.times_s = (0..=TIMES as usize)

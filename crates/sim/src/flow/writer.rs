@@ -201,6 +201,11 @@ const HEADER: &str = "step,time_s,step_s,courant,kinetic_energy_m5_s2,viscous_po
                       force_power_m5_s3,relative_divergence,subgrid_viscosity_m2_s,subgrid_decay,pressure_iterations,\
                       pressure_residual,pressure_factor,energy_rate_m5_s3,energy_residual_m5_s3";
 
+/// Number of the step of a row; none of a header or comment.
+fn step_of_row(row: &str) -> Option<u64> {
+    row.split(',').next()?.parse().ok()
+}
+
 /// The table and the row that waits.
 #[derive(Debug)]
 pub(super) struct StepTable {
@@ -214,18 +219,16 @@ impl StepTable {
     /// kept.
     fn open(path: &Path, origin: &Provenance, kept: &[u8]) -> Result<Self, Error> {
         let waiting = (!kept.is_empty()).then(|| String::from_utf8_lossy(kept).into_owned());
-        let step_of = |row: &str| {
-            row.split(',')
-                .next()
-                .and_then(|cell| cell.parse::<u64>().ok())
-        };
-        let next = waiting.as_deref().and_then(step_of).unwrap_or(0);
+        let next = waiting.as_deref().and_then(step_of_row).unwrap_or(0);
         // A table that was removed begins again with the rows to come.
         let old = std::fs::read_to_string(path).unwrap_or_default();
-        let rows = old
-            .lines()
-            .filter(|line| step_of(line).is_some_and(|step| step < next));
-        let rows: String = rows.map(|line| format!("{line}\n")).collect();
+        let mut rows = String::new();
+        for line in old.lines() {
+            if step_of_row(line).is_some_and(|step| step < next) {
+                rows += line;
+                rows.push('\n');
+            }
+        }
         write_atomic(path, format!("{}{HEADER}\n{rows}", origin.comment_lines()))?;
         let file = OpenOptions::new()
             .append(true)

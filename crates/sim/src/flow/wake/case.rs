@@ -59,31 +59,33 @@ impl PairScale {
     /// # Errors
     /// What is not positive.
     pub fn scales(self) -> Result<WakeScales, wakescope_les::Error> {
-        let of = |aircraft: &Aircraft| WakeScales::of_aircraft(aircraft);
-        match self {
+        let aircraft = match self {
             Self::Circulation {
                 spacing_m,
                 circulation_m2_s,
-            } => Ok(WakeScales {
-                spacing_m,
-                circulation_m2_s,
-            }),
+            } => {
+                return Ok(WakeScales {
+                    spacing_m,
+                    circulation_m2_s,
+                });
+            }
             Self::Aircraft {
                 mass_kg,
                 speed_m_s,
                 span_m,
                 air_density_kg_m3,
-            } => of(&Aircraft {
+            } => Aircraft {
                 mass_kg,
                 speed_m_s,
                 span_m,
                 air_density_kg_m3,
-            }),
-            Self::A320 {} => of(&Aircraft::A320),
-            Self::A340 {} => of(&Aircraft::A340_300),
-            Self::B747 {} => of(&Aircraft::B747_400),
-            Self::A380 {} => of(&Aircraft::A380_800),
-        }
+            },
+            Self::A320 {} => Aircraft::A320,
+            Self::A340 {} => Aircraft::A340_300,
+            Self::B747 {} => Aircraft::B747_400,
+            Self::A380 {} => Aircraft::A380_800,
+        };
+        WakeScales::of_aircraft(&aircraft)
     }
 }
 

@@ -35,22 +35,20 @@ impl FinishedWake {
     /// # Errors
     /// Files that are not there or not those of a wake; a run that has not come to its end.
     pub fn read(folder: &Path) -> Result<Self, Error> {
-        let refuse = |reason: String| Error::Input {
-            path: folder.to_owned(),
-            reason,
-        };
         let file = CaseFile::read(&folder.join("case.toml"))?;
-        let (CaseKind::Wake(flow), Some(output)) = (&file.content.case, &file.content.wake) else {
-            return Err(refuse("the case is no wake".into()));
+        let CaseKind::Wake(flow) = &file.content.case else {
+            return Err(Error::input(folder, "the case is no wake"));
+        };
+        let Some(output) = file.content.wake.clone() else {
+            return Err(Error::input(folder, "the case is no wake"));
         };
         let flow = (**flow).clone();
-        let output = output.clone();
         let scales = flow.pair.scales().map_err(Error::Flow)?;
         let mut columns = table(&folder.join("wake.csv"))?;
-        let scaled: Vec<(String, Vec<f64>)> = columns
-            .iter()
-            .filter_map(|(name, values)| in_units_of_the_pair(name, values, &scales))
-            .collect();
+        let mut scaled = Vec::new();
+        for (name, values) in &columns {
+            scaled.extend(in_units_of_the_pair(name, values, &scales));
+        }
         columns.extend(scaled);
         let wake = Self {
             folder: folder.to_owned(),
@@ -64,10 +62,9 @@ impl FinishedWake {
         // The last record need not be at the end.
         let last = (output.end_tau / output.every_tau + 1e-6).floor() * output.every_tau;
         if reached < last - 1e-9 {
-            return Err(refuse(format!(
-                "the run stands at tau = {reached} of {}",
-                output.end_tau
-            )));
+            let end = output.end_tau;
+            let reason = format!("the run stands at tau = {reached} of {end}");
+            return Err(Error::input(folder, reason));
         }
         Ok(wake)
     }
@@ -92,12 +89,11 @@ impl FinishedWake {
     /// # Errors
     /// As [`FinishedWake::column`].
     pub fn curve(&self, name: &str) -> Result<Vec<(f64, f64)>, Error> {
-        Ok(self
-            .column("tau")?
-            .iter()
-            .copied()
-            .zip(self.column(name)?.iter().copied())
-            .collect())
+        let mut points = Vec::new();
+        for (tau, value) in self.column("tau")?.iter().zip(self.column(name)?) {
+            points.push((*tau, *value));
+        }
+        Ok(points)
     }
 
     /// The run in words, its noise among them.
@@ -136,32 +132,26 @@ fn in_units_of_the_pair(
     Some((bare.to_owned(), scaled))
 }
 
-/// Columns of a table by name; empty places are NaN.
+/// Columns of a table by name; empty cells are NaN.
 ///
 /// # Errors
 /// A file that cannot be read; a value that is no number.
 pub fn table(path: &Path) -> Result<HashMap<String, Vec<f64>>, Error> {
     let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
-    let refuse = |reason: String| Error::Input {
-        path: path.to_owned(),
-        reason,
-    };
-    let table = TextTable::parse(&text).map_err(&refuse)?;
-    let number = |cell: &String| match cell.as_str() {
-        "" => Ok(f64::NAN),
-        text => text
-            .parse()
-            .map_err(|_| refuse(format!("{text} is no number"))),
-    };
-    let column = |(place, name): (usize, &String)| {
-        Ok((
-            name.clone(),
-            table
-                .rows
-                .iter()
-                .map(|row| number(&row[place]))
-                .collect::<Result<_, Error>>()?,
-        ))
-    };
-    table.header.iter().enumerate().map(column).collect()
+    let table = TextTable::parse(&text).map_err(|reason| Error::input(path, reason))?;
+    let mut columns = HashMap::new();
+    for (column, name) in table.header.iter().enumerate() {
+        let mut values = Vec::with_capacity(table.rows.len());
+        for row in &table.rows {
+            let cell = row[column].as_str();
+            values.push(match cell {
+                "" => f64::NAN,
+                cell => cell
+                    .parse()
+                    .map_err(|_| Error::input(path, format!("{cell} is no number")))?,
+            });
+        }
+        columns.insert(name.clone(), values);
+    }
+    Ok(columns)
 }

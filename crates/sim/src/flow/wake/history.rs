@@ -6,7 +6,9 @@
 
 use super::super::setup::WakeSetup;
 use crate::Error;
+use crate::io::netcdf::{Data, Layout, Variable};
 use crate::io::{Provenance, Table, write_atomic};
+use std::ops::Range;
 use std::path::Path;
 use wakescope_les::Flow;
 use wakescope_les::analysis::{VortexRecord, WakeRecord, WakeScales};
@@ -188,6 +190,18 @@ const NETCDF: &str = "wake.nc";
 /// All of them.
 pub(in super::super) const HISTORIES: [&str; 2] = [TABLE, NETCDF];
 
+fn variable(
+    name: &str,
+    dims: &'static [&'static str],
+    values: &[f64],
+    units: &str,
+    long_name: &str,
+) -> Variable {
+    Variable::new(name, dims, Data::f64_slice(values))
+        .text("units", units)
+        .text("long_name", long_name)
+}
+
 /// A number of all records.
 struct Column {
     name: String,
@@ -252,11 +266,11 @@ impl WakeRun {
     /// What a checkpoint must keep.
     pub(in super::super) fn kept(&self) -> Vec<u8> {
         let state = self.setup.meter.state();
-        state
-            .iter()
-            .chain(self.rows.iter().flatten())
-            .flat_map(|x| x.to_le_bytes())
-            .collect()
+        let mut bytes = Vec::new();
+        for number in state.iter().chain(self.rows.iter().flatten()) {
+            bytes.extend(number.to_le_bytes());
+        }
+        bytes
     }
 
     /// Measures the flow, for which all ranks must ask together.
@@ -269,63 +283,52 @@ impl WakeRun {
     /// The numbers that tables have, those over their first value first.
     fn columns(&self) -> Vec<Column> {
         let [from, to] = self.setup.circulation_radii_m;
-        let radii = [
-            format!("_{from}_{to}").replace('.', "p"),
-            format!(" from {from:?} to {to:?} m"),
-        ];
+        let radii_tag = format!("_{from}_{to}").replace('.', "p");
+        let radii = format!(" from {from:?} to {to:?} m");
         let mut out = Vec::new();
-        let mut add = |name: String, kind, text: String, values| {
-            out.push(Column {
-                name,
-                kind,
-                text,
-                values,
-            })
-        };
         for (side, which) in SIDES.iter().enumerate() {
-            let gamma = self.column(1 + side * VORTEX.len());
-            let first = gamma.first().copied().unwrap_or(f64::NAN);
-            let text = format!("{}{}, over its first value", VORTEX[0].2, radii[1]);
-            add(
-                format!("gamma_ratio_{which}"),
-                NUMBER,
-                text,
-                gamma.iter().map(|g| g / first).collect(),
-            );
+            let mut values = self.column(1 + side * VORTEX.len());
+            let first = values.first().copied().unwrap_or(f64::NAN);
+            for value in &mut values {
+                *value /= first;
+            }
+            out.push(Column {
+                name: format!("gamma_ratio_{which}"),
+                kind: NUMBER,
+                text: format!("{}{radii}, over its first value", VORTEX[0].2),
+                values,
+            });
         }
         for (side, which) in SIDES.iter().enumerate() {
             for (i, (name, kind, text, _)) in VORTEX.iter().enumerate() {
-                let [in_name, in_text] = if i == 0 {
-                    radii.clone()
-                } else {
-                    Default::default()
+                let (tag, radii) = match i {
+                    0 => (radii_tag.as_str(), radii.as_str()),
+                    _ => ("", ""),
                 };
-                let values = self.column(1 + side * VORTEX.len() + i);
-                add(
-                    format!("{name}{in_name}_{which}"),
+                out.push(Column {
+                    name: format!("{name}{tag}_{which}"),
                     kind,
-                    format!("{which} vortex: {text}{in_text}"),
-                    values,
-                );
+                    text: format!("{which} vortex: {text}{radii}"),
+                    values: self.column(1 + side * VORTEX.len() + i),
+                });
             }
         }
         for (i, (name, kind, text, _)) in FLOW.iter().enumerate() {
-            add(
-                (*name).into(),
+            out.push(Column {
+                name: (*name).into(),
                 kind,
-                (*text).into(),
-                self.column(1 + 2 * VORTEX.len() + i),
-            );
+                text: (*text).into(),
+                values: self.column(1 + 2 * VORTEX.len() + i),
+            });
         }
         let [.., modes, _] = self.starts();
         for mode in 0..self.modes().min(TABLE_MODES + 1) {
-            let text = format!("kinetic energy of axial mode {mode}, per length of x");
-            add(
-                format!("energy_mode_{mode}"),
-                ENERGY,
-                text,
-                self.column(modes + mode),
-            );
+            out.push(Column {
+                name: format!("energy_mode_{mode}"),
+                kind: ENERGY,
+                text: format!("kinetic energy of axial mode {mode}, per length of x"),
+                values: self.column(modes + mode),
+            });
         }
         out
     }
@@ -344,14 +347,14 @@ impl WakeRun {
 
     /// The history in SI units: the columns of which NetCDF has a variable each.
     fn table(&self) -> Table {
-        let table = Table::new()
+        let mut table = Table::new()
             .float("tau", self.tau())
             .float("time_s", self.column(0));
-        let named = |c: Column| (format!("{}{}", c.name, c.kind.suffix), c.values);
-        self.columns()
-            .into_iter()
-            .map(named)
-            .fold(table, |table, (name, values)| table.float(&name, values))
+        for column in self.columns() {
+            let name = format!("{}{}", column.name, column.kind.suffix);
+            table = table.float(&name, column.values);
+        }
+        table
     }
 
     /// Writes the table of the history so far.
@@ -374,104 +377,18 @@ impl WakeRun {
 
     /// All columns of the table and all lists over their axes, in SI units.
     fn netcdf(&self, origin: &Provenance) -> Result<Vec<u8>, Error> {
-        use crate::io::netcdf::{Data, Layout, Variable};
-        let [gamma, slices, modes, end] = self.starts();
-        let part = |from: usize, to: usize| {
-            self.rows
-                .iter()
-                .flat_map(|row| row[from..to].to_vec())
-                .collect::<Vec<f64>>()
-        };
-        let lists = |name: &str,
-                     dims: &'static [&'static str],
-                     values: Vec<f64>,
-                     units: &str,
-                     long_name: &str| {
-            Variable::new(name, dims, Data::f64(values))
-                .text("units", units)
-                .text("long_name", long_name)
-        };
-        let middle = slices + 2 * self.x_m.len();
-        let mut variables = vec![
-            lists(
-                "tau",
-                &["tau"],
-                self.tau(),
-                "1",
-                "age of the wake, t Gamma0 / (2 pi b0^2)",
-            ),
-            lists(
-                "time",
-                &["tau"],
-                self.column(0),
-                "s",
-                "time since the start of the flow",
-            ),
-            lists(
-                "radius",
-                &["radius"],
-                self.radius_m.clone(),
-                "m",
-                "radius of a circle about the centre of a vortex",
-            ),
-            lists(
-                "x",
-                &["x"],
-                self.x_m.clone(),
-                "m",
-                "position along the flight direction",
-            ),
-            lists(
-                "vortex",
-                &["vortex"],
-                vec![0.0, 1.0],
-                "1",
-                "0: began at smaller y; 1: at larger y",
-            ),
-            lists(
-                "mode",
-                &["mode"],
-                (0..self.modes()).map(|m| m as f64).collect(),
-                "1",
-                "waves along x in the box",
-            ),
-            lists(
-                "gamma",
-                &["tau", "vortex", "radius"],
-                part(gamma, slices),
-                "m2 s-1",
-                "circulation of the flow averaged along x; NaN where the circle leaves the flow",
-            ),
-            lists(
-                "y_centre",
-                &["tau", "vortex", "x"],
-                part(slices, middle),
-                "m",
-                "lateral position of the vortex",
-            ),
-            lists(
-                "z_centre",
-                &["tau", "vortex", "x"],
-                part(middle, modes),
-                "m",
-                "height of the vortex",
-            ),
-            lists(
-                "mode_energy",
-                &["tau", "mode"],
-                part(modes, end),
-                "m4 s-2",
-                "kinetic energy of an axial mode, per length of x",
-            ),
-        ];
-        variables.extend(self.columns().into_iter().map(|c| {
-            let name = if c.kind.is_named {
-                format!("{}{}", c.name, c.kind.suffix)
+        let mut variables = self.axis_variables();
+        variables.extend(self.list_variables());
+        for column in self.columns() {
+            let name = if column.kind.is_named {
+                format!("{}{}", column.name, column.kind.suffix)
             } else {
-                c.name
+                column.name
             };
-            lists(&name, &["tau"], c.values, c.kind.udunits, &c.text).text("coordinates", "time")
-        }));
+            let units = column.kind.udunits;
+            let variable = variable(&name, &["tau"], &column.values, units, &column.text);
+            variables.push(variable.text("coordinates", "time"));
+        }
         let dims = vec![
             ("tau", self.rows.len()),
             ("vortex", 2),
@@ -480,19 +397,102 @@ impl WakeRun {
             ("mode", self.modes()),
         ];
         let mut layout = Layout::cf("History of a simulated wake", dims, variables, origin);
-        let WakeScales {
-            spacing_m,
-            circulation_m2_s,
-            ..
-        } = self.setup.scales;
-        let scales = [
-            ("spacing_m", spacing_m),
-            ("circulation_m2_s", circulation_m2_s),
-        ];
-        layout
-            .globals
-            .extend(scales.map(|(name, value)| (name, format!("{value:?}"))));
+        let scales = &self.setup.scales;
+        for (name, value) in [
+            ("spacing_m", scales.spacing_m),
+            ("circulation_m2_s", scales.circulation_m2_s),
+        ] {
+            layout.globals.push((name, format!("{value:?}")));
+        }
         Ok(layout.into_bytes(origin)?)
+    }
+
+    /// Axes of the lists, with the times beside the ages.
+    fn axis_variables(&self) -> Vec<Variable> {
+        let modes: Vec<f64> = (0..self.modes()).map(|mode| mode as f64).collect();
+        vec![
+            variable(
+                "tau",
+                &["tau"],
+                &self.tau(),
+                "1",
+                "age of the wake, t Gamma0 / (2 pi b0^2)",
+            ),
+            variable(
+                "time",
+                &["tau"],
+                &self.column(0),
+                "s",
+                "time since the start of the flow",
+            ),
+            variable(
+                "radius",
+                &["radius"],
+                &self.radius_m,
+                "m",
+                "radius of a circle about the centre of a vortex",
+            ),
+            variable(
+                "x",
+                &["x"],
+                &self.x_m,
+                "m",
+                "position along the flight direction",
+            ),
+            variable(
+                "vortex",
+                &["vortex"],
+                &[0.0, 1.0],
+                "1",
+                "0: began at smaller y; 1: at larger y",
+            ),
+            variable("mode", &["mode"], &modes, "1", "waves along x in the box"),
+        ]
+    }
+
+    /// Lists over their axes.
+    fn list_variables(&self) -> Vec<Variable> {
+        let [gamma, slices, modes, end] = self.starts();
+        let middle = slices + 2 * self.x_m.len();
+        vec![
+            variable(
+                "gamma",
+                &["tau", "vortex", "radius"],
+                &self.lists(gamma..slices),
+                "m2 s-1",
+                "circulation of the flow averaged along x; NaN where the circle leaves the flow",
+            ),
+            variable(
+                "y_centre",
+                &["tau", "vortex", "x"],
+                &self.lists(slices..middle),
+                "m",
+                "lateral position of the vortex",
+            ),
+            variable(
+                "z_centre",
+                &["tau", "vortex", "x"],
+                &self.lists(middle..modes),
+                "m",
+                "height of the vortex",
+            ),
+            variable(
+                "mode_energy",
+                &["tau", "mode"],
+                &self.lists(modes..end),
+                "m4 s-2",
+                "kinetic energy of an axial mode, per length of x",
+            ),
+        ]
+    }
+
+    /// These numbers of all records, one record after the other.
+    fn lists(&self, numbers: Range<usize>) -> Vec<f64> {
+        let mut lists = Vec::with_capacity(self.rows.len() * numbers.len());
+        for row in &self.rows {
+            lists.extend(&row[numbers.clone()]);
+        }
+        lists
     }
 }
 

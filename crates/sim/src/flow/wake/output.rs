@@ -74,17 +74,13 @@ impl WakeOutput {
     }
 
     pub(in super::super) fn check(&self, p: &mut Checker<'_>) {
-        let end = self.end_tau;
-        let within = |list: &[f64]| {
-            list.windows(2).all(|w| w[1] > w[0]) && list.iter().all(|tau| (0.0..=end).contains(tau))
-        };
         for (key, list) in [
             ("wake.fields_tau", &self.fields_tau),
             ("wake.planes_tau", &self.planes_tau),
         ] {
             let list = list.as_deref().unwrap_or_default();
             p.require(
-                within(list),
+                self.are_ages(list),
                 key,
                 list,
                 "increasing, from 0 to wake.end_tau",
@@ -92,11 +88,17 @@ impl WakeOutput {
         }
         if let Some(range) = self.series_tau {
             p.require(
-                within(&range),
+                self.are_ages(&range),
                 "wake.series_tau",
                 range,
                 "two ages that increase, from 0 to wake.end_tau",
             );
         }
+    }
+
+    /// Whether ages increase from 0 to the end.
+    fn are_ages(&self, list: &[f64]) -> bool {
+        let increase = list.windows(2).all(|w| w[1] > w[0]);
+        increase && list.iter().all(|tau| (0.0..=self.end_tau).contains(tau))
     }
 }

@@ -152,19 +152,22 @@ impl FinishedWake {
             let values = rows
                 .flat_map(|row| (0..REPEATS * nx + 1).map(|i| (row[i % nx] / unit_per_s) as f32))
                 .collect();
-            let in_b0 = |axis: Vec<f64>| axis.into_iter().map(|a| a / scales.spacing_m).collect();
-            let volume = Volume::new([repeated, in_b0(y), in_b0(z)], values)?;
-            let surface = |level: f64, colour, opacity| Surface {
-                level,
-                colour,
-                opacity,
-            };
+            let y = y.iter().map(|y_m| y_m / scales.spacing_m).collect();
+            let z = z.iter().map(|z_m| z_m / scales.spacing_m).collect();
             panels.push(Panel::Surfaces(IsosurfacePlot {
                 title: format!("τ = {tau}"),
-                volume,
+                volume: Volume::new([repeated, y, z], values)?,
                 surfaces: vec![
-                    surface(1.0, [120, 170, 215], 0.35),
-                    surface(10.0, [200, 60, 40], 1.0),
+                    Surface {
+                        level: 1.0,
+                        colour: [120, 170, 215],
+                        opacity: 0.35,
+                    },
+                    Surface {
+                        level: 10.0,
+                        colour: [200, 60, 40],
+                        opacity: 1.0,
+                    },
                 ],
                 view_rad: [-0.55, 0.35],
             }));
@@ -173,7 +176,8 @@ impl FinishedWake {
             return Ok(None);
         }
         let mut figure = Figure::stacked(panels);
-        (figure.columns, figure.width) = (2, 1200.0);
+        figure.columns = 2;
+        figure.width = 1200.0;
         Ok(Some(figure))
     }
 

@@ -22,16 +22,6 @@ pub enum WakePreset {
 impl WakePreset {
     /// The flow.
     pub fn flow(self) -> WakeFlow {
-        // Cells about the vortices are a third of a core radius and more.
-        let refined = |cells, size, ground_stretch| WakeFlow {
-            cells,
-            size,
-            ground_stretch,
-            lateral_stretch: 0.45,
-            core_radius: 0.05,
-            reynolds: 2e4,
-            ..WakeFlow::default()
-        };
         match self {
             Self::Coarse => WakeFlow::default(),
             // Case B of the independent reference, the same flow in a wider box.
@@ -40,8 +30,22 @@ impl WakePreset {
                 size: [1.0, 5.0, 2.5],
                 ..WakeFlow::default()
             },
-            Self::Fine => refined([64, 256, 144], [1.0, 5.0, 2.5], 2.0),
-            Self::Chapter => refined([128, 432, 224], [2.0, 6.0, 3.0], 2.2),
+            // Cells about the vortices are a third of a core radius and more.
+            Self::Fine => WakeFlow {
+                cells: [64, 256, 144],
+                size: [1.0, 5.0, 2.5],
+                ground_stretch: 2.0,
+                lateral_stretch: 0.45,
+                core_radius: 0.05,
+                reynolds: 2e4,
+                ..WakeFlow::default()
+            },
+            Self::Chapter => WakeFlow {
+                cells: [128, 432, 224],
+                size: [2.0, 6.0, 3.0],
+                ground_stretch: 2.2,
+                ..Self::Fine.flow()
+            },
         }
     }
 

@@ -18,6 +18,12 @@ pub(in super::super) struct Due {
     pub(in super::super) planes: Option<usize>,
 }
 
+/// Ages from one to another, a step apart.
+fn ages([from, to]: [f64; 2], step: f64) -> Vec<f64> {
+    let count = ((to - from) / step + SAME).floor() as usize;
+    (0..=count).map(|i| from + i as f64 * step).collect()
+}
+
 /// The output times and what is due at each.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Schedule {
@@ -41,30 +47,23 @@ impl Schedule {
     /// The outputs of a wake whose `tau` grows by `tau_per_s` and which ends at `end_s`.
     pub(in super::super) fn of_wake(output: &WakeOutput, tau_per_s: f64, end_s: f64) -> Self {
         let end_tau = end_s * tau_per_s;
-        let every = |[from, to]: [f64; 2], step: f64| {
-            let count = ((to - from) / step + SAME).floor() as usize;
-            (0..=count)
-                .map(move |i| from + i as f64 * step)
-                .collect::<Vec<f64>>()
-        };
         let mut planes = output.planes_tau.clone().unwrap_or_default();
-        planes.extend(
-            output
-                .series_tau
-                .map(|range| every(range, output.series_every_tau))
-                .unwrap_or_default(),
-        );
+        if let Some(range) = output.series_tau {
+            planes.extend(ages(range, output.series_every_tau));
+        }
         let lists = [
-            every([0.0, end_tau], output.every_tau),
+            ages([0.0, end_tau], output.every_tau),
             output.fields_tau.clone().unwrap_or_default(),
             planes,
         ];
-        let mut all: Vec<(f64, usize)> = lists
-            .iter()
-            .enumerate()
-            .flat_map(|(kind, list)| list.iter().map(move |tau| (*tau, kind)))
-            .collect();
-        all.retain(|(tau, _)| *tau <= end_tau + SAME);
+        let mut all: Vec<(f64, usize)> = Vec::new();
+        for (kind, list) in lists.iter().enumerate() {
+            for tau in list {
+                if *tau <= end_tau + SAME {
+                    all.push((*tau, kind));
+                }
+            }
+        }
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut schedule = Self {
             times_s: Vec::new(),
