@@ -40,15 +40,19 @@ impl Axis {
         self
     }
 
-    /// Range to draw: the asked one, or that of the values with a margin of `pad` of its length.
+    /// Whether a value has a position on the axis.
+    fn is_usable(&self, value: f64) -> bool {
+        value.is_finite() && (!self.log || value > 0.0)
+    }
+
+    /// Range to draw: the requested one, or that of the values with a margin of `pad` of its length.
     pub(crate) fn resolve(
         &self,
         values: impl Iterator<Item = f64>,
         pad: f64,
     ) -> OutputResult<(f64, f64)> {
-        let usable = |v: &f64| v.is_finite() && (!self.log || *v > 0.0);
         if let Some((low, high)) = self.range {
-            if low < high && usable(&low) && usable(&high) {
+            if low < high && self.is_usable(low) && self.is_usable(high) {
                 return Ok((low, high));
             }
             let name = format!("range of axis '{}'", self.label);
@@ -59,7 +63,8 @@ impl Axis {
                 "finite and increasing, positive on a logarithmic axis",
             ));
         }
-        let (low, high) = extremes(values.filter(usable).map(|v| forth(self.log, v)));
+        let usable = values.filter(|v| self.is_usable(*v));
+        let (low, high) = extremes(usable.map(|v| forth(self.log, v)));
         if low > high {
             // Nothing to draw: an empty frame is honest and no error.
             return Ok(if self.log { (0.1, 10.0) } else { (0.0, 1.0) });
@@ -144,9 +149,18 @@ impl Scale<'_> {
         if !self.log || decades > 8.0 {
             return Vec::new();
         }
-        let decades = self.range.0.log10().floor() as i32..=self.range.1.log10().ceil() as i32;
-        let all = decades.flat_map(|e| (2..10).map(move |m| f64::from(m) * 10_f64.powi(e)));
-        all.filter(|v| self.holds(*v)).collect()
+        let first = self.range.0.log10().floor() as i32;
+        let last = self.range.1.log10().ceil() as i32;
+        let mut ticks = Vec::new();
+        for exponent in first..=last {
+            for multiple in 2..10 {
+                let value = f64::from(multiple) * 10_f64.powi(exponent);
+                if self.holds(value) {
+                    ticks.push(value);
+                }
+            }
+        }
+        ticks
     }
 
     fn holds(&self, value: f64) -> bool {
@@ -166,53 +180,67 @@ impl Scale<'_> {
             &[1.0]
         };
         let is_plain = first >= -3 && last <= 4;
-        let tick = |(e, factor): (i32, f64)| {
-            let value = factor * 10_f64.powi(e);
-            let label = match is_plain {
-                true => decimal(value, usize::try_from(-e).unwrap_or(0)),
-                false if factor == 1.0 => power("", e),
-                false => power(&format!("{factor}·"), e),
-            };
-            (value, label)
-        };
-        let decades = (first - 1..=last).filter(|e| e.rem_euclid(step) == 0);
-        let all = decades.flat_map(|e| factors.iter().map(move |factor| (e, *factor)));
-        all.map(tick).filter(|tick| self.holds(tick.0)).collect()
+        let mut ticks = Vec::new();
+        for exponent in first - 1..=last {
+            if exponent.rem_euclid(step) != 0 {
+                continue;
+            }
+            for factor in factors {
+                let value = factor * 10_f64.powi(exponent);
+                if !self.holds(value) {
+                    continue;
+                }
+                let label = match is_plain {
+                    true => decimal(value, usize::try_from(-exponent).unwrap_or(0)),
+                    false if *factor == 1.0 => power("", exponent),
+                    false => power(&format!("{factor}·"), exponent),
+                };
+                ticks.push((value, label));
+            }
+        }
+        ticks
     }
 }
 
-fn linear_ticks((low, high): (f64, f64), count: f64) -> Vec<Tick> {
-    let raw = (high - low) / count;
+fn linear_ticks(range: (f64, f64), count: f64) -> Vec<Tick> {
+    let raw = (range.1 - range.0) / count;
     let power_of_ten = 10_f64.powf(raw.log10().floor());
     // The step whose number of ticks is nearest to the wanted one, in ratio.
-    let distance = |step: &f64| (step / raw).ln().abs();
-    let steps = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0].map(|m| m * power_of_ten);
-    let ends = |step: f64| ((low / step - 1e-6).ceil(), (high / step + 1e-6).floor());
-    // Two ticks do not show a scale: then the next finer step.
-    let enough = steps
-        .into_iter()
-        .filter(|step| ends(*step).1 - ends(*step).0 >= 2.0);
-    let step = enough
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .unwrap_or(raw);
-    let largest = low.abs().max(high.abs());
+    let mut step = raw;
+    let mut least = f64::INFINITY;
+    for multiple in [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0] {
+        let candidate = multiple * power_of_ten;
+        let (first, last) = tick_numbers(range, candidate);
+        let distance = (candidate / raw).ln().abs();
+        // Two ticks do not show a scale: then the next finer step.
+        if last - first >= 2.0 && distance < least {
+            step = candidate;
+            least = distance;
+        }
+    }
+    let largest = range.0.abs().max(range.1.abs());
     let [exponent, common] = [step, largest].map(|v| (v.log10() + 1e-9).floor() as i32);
     let is_plain = (1e-3..1e5).contains(&largest);
-    let label = |value: f64| match is_plain || value == 0.0 {
-        true => decimal(value, usize::try_from(-exponent).unwrap_or(0)),
-        false => {
-            let digits = usize::try_from(common - exponent).unwrap_or(0);
-            power(
-                &format!("{}·", decimal(value / 10_f64.powi(common), digits)),
-                common,
-            )
-        }
-    };
-    let (first, last) = ends(step);
-    (first as i64..=last as i64)
-        .map(|i| i as f64 * step)
-        .map(|value| (value, label(value)))
-        .collect()
+    let (first, last) = tick_numbers(range, step);
+    let mut ticks = Vec::new();
+    for number in first as i64..=last as i64 {
+        let value = number as f64 * step;
+        let label = match is_plain || value == 0.0 {
+            true => decimal(value, usize::try_from(-exponent).unwrap_or(0)),
+            false => {
+                let digits = usize::try_from(common - exponent).unwrap_or(0);
+                let mantissa = decimal(value / 10_f64.powi(common), digits);
+                power(&format!("{mantissa}·"), common)
+            }
+        };
+        ticks.push((value, label));
+    }
+    ticks
+}
+
+/// Numbers of the first and the last multiple of a step in a range.
+fn tick_numbers((low, high): (f64, f64), step: f64) -> (f64, f64) {
+    ((low / step - 1e-6).ceil(), (high / step + 1e-6).floor())
 }
 
 /// A factor before a power of ten.

@@ -50,19 +50,24 @@ impl CurvePlot {
     }
 
     fn ranges(&self) -> OutputResult<((f64, f64), (f64, f64))> {
-        let points = || self.series.iter().flat_map(|s| &s.points);
-        let bands = self
-            .series
-            .iter()
-            .flat_map(|s| s.band.iter().flatten())
-            .flat_map(|b| [b.0, b.1]);
+        let mut x = Vec::new();
+        let mut y = Vec::new();
+        for series in &self.series {
+            for point in &series.points {
+                x.push(point.0);
+                y.push(point.1);
+            }
+            for edges in series.band.iter().flatten() {
+                y.extend([edges.0, edges.1]);
+            }
+        }
         let pad = if self.equal_scales || self.series.iter().any(|s| s.style == Style::Markers) {
             0.04
         } else {
             0.0
         };
-        let x = self.x.resolve(points().map(|p| p.0), pad)?;
-        let y = self.y.resolve(points().map(|p| p.1).chain(bands), 0.06)?;
+        let x = self.x.resolve(x.into_iter(), pad)?;
+        let y = self.y.resolve(y.into_iter(), 0.06)?;
         Ok((x, y))
     }
 
@@ -287,19 +292,20 @@ impl Series {
     ) {
         let fill = curve_colour(colour);
         // x, lower and upper edge.
-        let band: Vec<_> = points
-            .iter()
-            .zip(band)
-            .map(|(p, b)| (p.0, b.0, b.1))
-            .collect();
-        let bands = band.split(|b| !(b.0.is_finite() && b.1.is_finite() && b.2.is_finite()));
+        let mut edges = Vec::with_capacity(band.len());
+        for (point, band) in points.iter().zip(band) {
+            edges.push((point.0, band.0, band.1));
+        }
+        let bands = edges.split(|b| !(b.0.is_finite() && b.1.is_finite() && b.2.is_finite()));
         if self.style == Style::Markers {
             for &(x, low, high) in bands.flatten() {
-                let cap = |y: f64| [(x - CAP, y), (x + CAP, y)];
-                out.extend(
-                    [[(x, low), (x, high)], cap(low), cap(high)]
-                        .map(|line| Shape::line(line, fill, 1.4)),
-                );
+                for line in [
+                    [(x, low), (x, high)],
+                    [(x - CAP, low), (x + CAP, low)],
+                    [(x - CAP, high), (x + CAP, high)],
+                ] {
+                    out.push(Shape::line(line, fill, 1.4));
+                }
             }
         } else {
             // One polygon for a stretch without gap: forth along the upper edge, back along the lower.
@@ -320,12 +326,11 @@ impl Series {
             }));
         }
         if self.style.has_markers() {
-            out.extend(
-                points
-                    .iter()
-                    .filter(|p| finite(p))
-                    .map(|p| marker(*p, colour)),
-            );
+            for point in points {
+                if finite(point) {
+                    out.push(marker(*point, colour));
+                }
+            }
         }
     }
 }
@@ -338,14 +343,12 @@ fn marker(at: (f64, f64), index: usize) -> Shape {
         (3, 6.2, -0.25),
         (4, 5.8, 0.0),
     ][index % 4];
-    let corner = |i: u32| {
-        let angle = std::f64::consts::TAU * (f64::from(i) / f64::from(corners) + turn);
-        (at.0 + radius * angle.cos(), at.1 + radius * angle.sin())
-    };
-    Shape::area(
-        (0..corners).map(corner).collect::<Vec<_>>(),
-        curve_colour(index),
-    )
+    let mut points = Vec::with_capacity(corners as usize);
+    for corner in 0..corners {
+        let angle = std::f64::consts::TAU * (f64::from(corner) / f64::from(corners) + turn);
+        points.push((at.0 + radius * angle.cos(), at.1 + radius * angle.sin()));
+    }
+    Shape::area(points, curve_colour(index))
 }
 
 fn finite(p: &(f64, f64)) -> bool {
@@ -418,33 +421,39 @@ fn legend_place(
 ) -> (Frame, usize) {
     let corners = [(1.0, 0.0), (0.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
     let edges = [(0.5, 0.0), (0.5, 1.0), (1.0, 0.5), (0.0, 0.5)];
-    let part = |step: u8| f64::from(step) / f64::from(GRID_PLACES);
-    let all = (0..=GRID_PLACES)
-        .flat_map(|row| (0..=GRID_PLACES).map(move |column| (1.0 - part(column), part(row))));
-    let places = corners
-        .into_iter()
-        .chain(edges)
-        .chain(all)
-        .map(|(across, down)| Frame {
+    let mut places = [corners, edges].concat();
+    for row in 0..=GRID_PLACES {
+        for column in 0..=GRID_PLACES {
+            let across = f64::from(column) / f64::from(GRID_PLACES);
+            let down = f64::from(row) / f64::from(GRID_PLACES);
+            places.push((1.0 - across, down));
+        }
+    }
+    let mut best: Option<(Frame, usize)> = None;
+    for (across, down) in places {
+        let place = Frame {
             left: frame.left + INSET + across * (frame.width - 2.0 * INSET - width),
             top: frame.top + INSET + down * (frame.height - 2.0 * INSET - height),
             width,
             height,
-        });
-    // Markers and the width of lines reach beyond their points.
-    let covered = |f: &Frame| {
-        let inside = |p: &&(f64, f64)| {
-            p.0 > f.left - REACH
-                && p.0 < f.right() + REACH
-                && p.1 > f.top - REACH
-                && p.1 < f.bottom() + REACH
         };
-        occupied.iter().filter(inside).count()
-    };
-    let counted = places.map(|place| (place, covered(&place)));
-    counted
-        .min_by_key(|(_, count)| *count)
-        .unwrap_or((frame, 0))
+        let count = covered(&place, occupied);
+        if best.is_none_or(|(_, least)| count < least) {
+            best = Some((place, count));
+        }
+    }
+    best.unwrap_or((frame, 0))
+}
+
+/// Number of points under a frame; markers and the width of lines reach beyond their points.
+fn covered(frame: &Frame, occupied: &[(f64, f64)]) -> usize {
+    let mut count = 0;
+    for (x, y) in occupied {
+        let is_beside = *x > frame.left - REACH && *x < frame.right() + REACH;
+        let is_level = *y > frame.top - REACH && *y < frame.bottom() + REACH;
+        count += usize::from(is_beside && is_level);
+    }
+    count
 }
 
 #[cfg(test)]

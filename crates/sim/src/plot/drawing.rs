@@ -24,6 +24,16 @@ impl Frame {
         self.top + self.height
     }
 
+    /// A line from the top to the bottom.
+    pub(crate) fn vertical(&self, x: f64) -> [(f64, f64); 2] {
+        [(x, self.top), (x, self.bottom())]
+    }
+
+    /// A line from the left to the right.
+    pub(crate) fn horizontal(&self, y: f64) -> [(f64, f64); 2] {
+        [(self.left, y), (self.right(), y)]
+    }
+
     /// Once round and along the first side again, so that a line along it has its joint at every corner.
     pub(crate) fn outline(&self) -> Vec<(f64, f64)> {
         let l = self.left;
@@ -139,41 +149,44 @@ pub(crate) struct Run<'a> {
     pub(crate) rise: f64,
 }
 
+impl<'a> Run<'a> {
+    fn plain(text: &'a str) -> Self {
+        Self {
+            text,
+            scale: 1.0,
+            rise: 0.0,
+        }
+    }
+}
+
 /// Splits a text at `^{...}` and `_{...}`; a brace that is never closed is plain text.
 pub(crate) fn runs(text: &str) -> Vec<Run<'_>> {
     let mut out = Vec::new();
     let mut rest = text;
-    let plain = |text| Run {
-        text,
-        scale: 1.0,
-        rise: 0.0,
-    };
-    let marked = |rest: &str| {
-        let start = ["^{", "_{"]
-            .iter()
-            .filter_map(|mark| rest.find(mark))
-            .min()?;
-        Some((start, start + rest[start..].find('}')?))
-    };
     while let Some((start, end)) = marked(rest) {
         let rise = if rest[start..].starts_with('^') {
             0.36
         } else {
             -0.18
         };
-        out.extend([
-            plain(&rest[..start]),
-            Run {
-                text: &rest[start + 2..end],
-                scale: 0.72,
-                rise,
-            },
-        ]);
+        out.push(Run::plain(&rest[..start]));
+        out.push(Run {
+            text: &rest[start + 2..end],
+            scale: 0.72,
+            rise,
+        });
         rest = &rest[end + 1..];
     }
-    out.push(plain(rest));
+    out.push(Run::plain(rest));
     out.retain(|run| !run.text.is_empty());
     out
+}
+
+/// Where the first marked part of a text begins, and where its closing brace is.
+fn marked(text: &str) -> Option<(usize, usize)> {
+    let starts = ["^{", "_{"].map(|mark| text.find(mark));
+    let start = starts.into_iter().flatten().min()?;
+    Some((start, start + text[start..].find('}')?))
 }
 
 #[cfg(test)]

@@ -25,6 +25,16 @@ pub enum Panel {
     Surfaces(IsosurfacePlot),
 }
 
+impl Panel {
+    fn height(&self, width: f64) -> OutputResult<f64> {
+        match self {
+            Self::Curves(plot) => plot.height(width),
+            Self::Map(plot) => Ok(plot.height(width)),
+            Self::Surfaces(plot) => Ok(plot.height(width)),
+        }
+    }
+}
+
 impl From<CurvePlot> for Panel {
     fn from(plot: CurvePlot) -> Self {
         Self::Curves(plot)
@@ -150,13 +160,13 @@ impl Figure {
         }
         let width = (self.width - 2.0 * MARGIN) / self.columns as f64;
         for row in self.panels.chunks(self.columns) {
-            let height = |panel: &Panel| match panel {
-                Panel::Curves(plot) => plot.height(width),
-                Panel::Map(plot) => Ok(plot.height(width)),
-                Panel::Surfaces(plot) => Ok(plot.height(width)),
-            };
-            let heights: Vec<f64> = row.iter().map(height).collect::<OutputResult<_>>()?;
-            let highest = heights.iter().copied().fold(0.0, f64::max);
+            let mut heights = Vec::with_capacity(row.len());
+            let mut highest = 0_f64;
+            for panel in row {
+                let height = panel.height(width)?;
+                highest = highest.max(height);
+                heights.push(height);
+            }
             for (column, (panel, own)) in row.iter().zip(heights).enumerate() {
                 let left = MARGIN + column as f64 * width;
                 let cell = Frame {

@@ -64,20 +64,18 @@ pub(crate) fn panel(
     font: &Font,
     out: &mut Vec<Shape>,
 ) {
-    let across = |value: f64| [(x.place(value), f.top), (x.place(value), f.bottom())];
-    let along = |value: f64| [(f.left, y.place(value)), (f.right(), y.place(value))];
-    let ticks =
-        |scale: &Scale<'_>, side: Side| scale.ticks(side.gap()).into_iter().map(|tick| tick.0);
-    let minor = x
-        .minor_ticks()
-        .into_iter()
-        .map(across)
-        .chain(y.minor_ticks().into_iter().map(along));
-    let major = ticks(x, Side::Bottom)
-        .map(across)
-        .chain(ticks(y, Side::Left).map(along));
-    out.extend(minor.map(|line| Shape::line(line, FAINT_GRID, 1.0)));
-    out.extend(major.map(|line| Shape::line(line, GRID, 1.0)));
+    for value in x.minor_ticks() {
+        out.push(Shape::line(f.vertical(x.place(value)), FAINT_GRID, 1.0));
+    }
+    for value in y.minor_ticks() {
+        out.push(Shape::line(f.horizontal(y.place(value)), FAINT_GRID, 1.0));
+    }
+    for (value, _) in x.ticks(Side::Bottom.gap()) {
+        out.push(Shape::line(f.vertical(x.place(value)), GRID, 1.0));
+    }
+    for (value, _) in y.ticks(Side::Left.gap()) {
+        out.push(Shape::line(f.horizontal(y.place(value)), GRID, 1.0));
+    }
     out.push(Shape::Clip {
         frame: *f,
         shapes: content,

@@ -63,6 +63,21 @@ impl Camera {
     }
 }
 
+/// The axis along which an edge of the box lies, and its corners.
+type Edge = (usize, usize, usize);
+
+/// A point of an edge in the picture.
+fn point_on_edge(corners: &[(f64, f64); 8], (_, a, b): Edge, fraction: f64) -> (f64, f64) {
+    let a = corners[a];
+    let b = corners[b];
+    (a.0 + fraction * (b.0 - a.0), a.1 + fraction * (b.1 - a.1))
+}
+
+/// A point of a ray at a distance \[m\].
+fn point_on_ray(from_m: [f64; 3], along: [f64; 3], distance_m: f64) -> [f64; 3] {
+    [0, 1, 2].map(|d| from_m[d] + distance_m * along[d])
+}
+
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -95,65 +110,48 @@ impl IsosurfacePlot {
     }
 
     pub(crate) fn draw(&self, cell: Frame, out: &mut Vec<Shape>) -> OutputResult<()> {
-        for surface in &self.surfaces {
-            if !(surface.level.is_finite() && (0.0..=1.0).contains(&surface.opacity)) {
-                let value = format!("level {}, opacity {}", surface.level, surface.opacity);
-                return Err(OutputError::value(
-                    "surface",
-                    value,
-                    "a finite level, opacity 0 to 1",
-                ));
-            }
-        }
+        self.check_surfaces()?;
         let camera = self.camera();
+        let scale = self.scale(&camera, cell);
         let [across, up] = camera.size_m();
-        let room = (
-            cell.width - 2.0 * MARGIN,
-            cell.height - 2.0 * MARGIN - top_room(&self.title),
-        );
-        let scale = (room.0 / across).min(room.1 / up);
         let frame = Frame {
             left: cell.left + 0.5 * (cell.width - scale * across),
             top: cell.top + top_room(&self.title) + 0.5 * MARGIN,
             width: scale * across,
             height: scale * up,
         };
-        let [left_m, low_m] = camera.range_m.map(|range| range.0);
-        let corners_m = self.corners_m();
-        let corners = corners_m.map(|at_m| {
-            let x_m = dot(at_m, camera.right) - left_m;
-            let y_m = dot(at_m, camera.up) - low_m;
-            (frame.left + scale * x_m, frame.bottom() - scale * y_m)
-        });
-        // Of each edge the axis that it lies along, and its ends.
-        let edges = (0..3).flat_map(|d| {
-            (0..8)
-                .filter(move |from| from >> d & 1 == 0)
-                .map(move |from| (d, from, from | 1 << d))
-        });
+        let corners = self.corners(&camera, frame, scale);
         // The corner farthest from the eye has the hidden edges.
-        let depth_m = |corner: &usize| dot(corners_m[*corner], camera.into);
-        let far = (0..8).max_by(|a, b| depth_m(a).total_cmp(&depth_m(b)));
-        let (hidden, seen): (Vec<_>, Vec<_>) =
-            edges.partition(|(_, a, b)| far == Some(*a) || far == Some(*b));
-        let lines = |edges: &[(usize, usize, usize)]| -> Vec<Shape> {
-            edges
-                .iter()
-                .map(|(_, a, b)| Shape::line([corners[*a], corners[*b]], EDGE, 1.0))
-                .collect()
-        };
+        let corners_m = self.corners_m();
+        let depths_m = corners_m.map(|corner_m| dot(corner_m, camera.into));
+        let far = (0..8).max_by(|a, b| depths_m[*a].total_cmp(&depths_m[*b]));
+        let mut hidden = Vec::new();
+        let mut visible = Vec::new();
+        for axis in 0..3 {
+            for from in (0..8).filter(|from| from >> axis & 1 == 0) {
+                let to = from | 1 << axis;
+                match far == Some(from) || far == Some(to) {
+                    true => hidden.push((axis, from, to)),
+                    false => visible.push((axis, from, to)),
+                }
+            }
+        }
         out.push(Shape::area(
             [0, 1, 3, 2].map(|corner| corners[corner]),
             GROUND,
         ));
-        out.extend(lines(&hidden));
+        for (_, a, b) in &hidden {
+            out.push(Shape::line([corners[*a], corners[*b]], EDGE, 1.0));
+        }
         let size =
             [frame.width, frame.height].map(|length| ((length * DENSITY).round() as u32).max(1));
         out.push(Shape::Image {
             frame,
             pixels: self.pixels(&camera, size)?,
         });
-        out.extend(lines(&seen));
+        for (_, a, b) in &visible {
+            out.push(Shape::line([corners[*a], corners[*b]], EDGE, 1.0));
+        }
         let middle = cell.left + cell.width / 2.0;
         out.push(Shape::text(
             (middle, cell.top + 20.0),
@@ -161,34 +159,75 @@ impl IsosurfacePlot {
             TICK_SIZE + 2.0,
             Anchor::Middle,
         ));
-        // Names and ends of the axes at the lowest edges in the picture, of the vertical one at the leftmost; edges that share a corner
-        // keep apart.
-        let along = |(_, a, b): &(usize, usize, usize), share: f64| {
-            let a = corners[*a];
-            let b = corners[*b];
-            (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1))
-        };
-        for (d, name) in ["x", "y", "z"].into_iter().enumerate() {
-            let outward = |edge: &(usize, usize, usize)| {
-                if d == 2 {
-                    -along(edge, 0.5).0
-                } else {
-                    along(edge, 0.5).1
+        self.label_axes(&corners, &[hidden, visible].concat(), out);
+        self.draw_legend(frame, out);
+        Ok(())
+    }
+
+    fn check_surfaces(&self) -> OutputResult<()> {
+        for surface in &self.surfaces {
+            if !(surface.level.is_finite() && (0.0..=1.0).contains(&surface.opacity)) {
+                return Err(OutputError::value(
+                    "surface",
+                    format!("level {}, opacity {}", surface.level, surface.opacity),
+                    "a finite level, opacity 0 to 1",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Drawing units per metre that let the box fill its cell.
+    fn scale(&self, camera: &Camera, cell: Frame) -> f64 {
+        let [across, up] = camera.size_m();
+        let width = cell.width - 2.0 * MARGIN;
+        let height = cell.height - 2.0 * MARGIN - top_room(&self.title);
+        (width / across).min(height / up)
+    }
+
+    /// The corners of the box in its picture.
+    fn corners(&self, camera: &Camera, frame: Frame, scale: f64) -> [(f64, f64); 8] {
+        let [(left_m, _), (low_m, _)] = camera.range_m;
+        self.corners_m().map(|at_m| {
+            let x_m = dot(at_m, camera.right) - left_m;
+            let y_m = dot(at_m, camera.up) - low_m;
+            (frame.left + scale * x_m, frame.bottom() - scale * y_m)
+        })
+    }
+
+    /// Names and ends of the axes at the lowest edges in the picture, of the vertical one at the leftmost; edges that share a corner
+    /// keep apart.
+    fn label_axes(&self, corners: &[(f64, f64); 8], edges: &[Edge], out: &mut Vec<Shape>) {
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let mut outermost = None;
+            let mut largest = f64::NEG_INFINITY;
+            for edge in edges.iter().filter(|edge| edge.0 == axis) {
+                let (x, y) = point_on_edge(corners, *edge, 0.5);
+                let outward = if axis == 2 { -x } else { y };
+                if outward >= largest {
+                    outermost = Some(*edge);
+                    largest = outward;
                 }
-            };
-            let of_axis = hidden.iter().chain(&seen).filter(|edge| edge.0 == d);
-            let Some(edge) = of_axis.max_by(|a, b| outward(a).total_cmp(&outward(b))) else {
+            }
+            let Some(edge) = outermost else {
                 continue;
             };
-            let [low, high] = self.volume.corners_m().map(|end| format!("{:.1}", end[d]));
-            for (share, text) in [(0.5, name), (0.08, &low), (0.92, &high)] {
-                let (x, y) = along(edge, share);
-                out.push(match d {
+            let [low, high] = self
+                .volume
+                .corners_m()
+                .map(|end| format!("{:.1}", end[axis]));
+            for (fraction, text) in [(0.5, name), (0.08, &low), (0.92, &high)] {
+                let (x, y) = point_on_edge(corners, edge, fraction);
+                out.push(match axis {
                     2 => Shape::text((x - 4.0, y), text, TICK_SIZE - 1.0, Anchor::End),
                     _ => Shape::text((x, y + TICK_SIZE), text, TICK_SIZE - 1.0, Anchor::Middle),
                 });
             }
         }
+    }
+
+    /// The levels of the surfaces in their colours.
+    fn draw_legend(&self, frame: Frame, out: &mut Vec<Shape>) {
         for (row, surface) in self.surfaces.iter().enumerate() {
             let left = frame.left + 4.0;
             let bottom = frame.top + 14.0 + 18.0 * row as f64;
@@ -211,7 +250,6 @@ impl IsosurfacePlot {
                 Anchor::Start,
             ));
         }
-        Ok(())
     }
 
     /// The lit surfaces on a transparent ground.
@@ -274,6 +312,15 @@ pub struct Volume {
     pub values: Vec<f32>,
 }
 
+/// Whether the corners of a cell are on both sides of a level.
+fn is_crossed(corners: &[f64; 8], level: f64) -> bool {
+    corners.iter().any(|v| (*v < level) != (corners[0] < level))
+}
+
+fn between(a: f64, b: f64, fraction: f64) -> f64 {
+    a + fraction * (b - a)
+}
+
 /// Steps of a ray through a cell: along it the interpolant is a polynomial of third degree.
 const STEPS: u32 = 4;
 const BISECTIONS: usize = 10;
@@ -324,27 +371,24 @@ impl Volume {
     /// Values at the corners of a cell, x fastest.
     fn corners(&self, [i, j, k]: [usize; 3]) -> [f32; 8] {
         let [nx, ny, _] = self.axis_m.each_ref().map(Vec::len);
-        let row = |j: usize, k: usize| (k * ny + j) * nx + i;
-        let [a, b, c, d] = [row(j, k), row(j + 1, k), row(j, k + 1), row(j + 1, k + 1)];
+        let a = (k * ny + j) * nx + i;
+        let b = a + nx;
+        let c = a + ny * nx;
+        let d = c + nx;
         [a, a + 1, b, b + 1, c, c + 1, d, d + 1].map(|place| self.values[place])
     }
 
     /// The interpolant of a cell; positions outside are moved to its nearest face.
     fn within(&self, cell: [usize; 3], at_m: [f64; 3]) -> f64 {
-        let part = |d: usize| {
+        let [x, y, z] = [0, 1, 2].map(|d| {
             let low = self.axis_m[d][cell[d]];
             let high = self.axis_m[d][cell[d] + 1];
             ((at_m[d] - low) / (high - low)).clamp(0.0, 1.0)
-        };
-        let between = |a: f64, b: f64, part: f64| a + part * (b - a);
+        });
         let [a, b, c, d, e, f, g, h] = self.corners(cell).map(f64::from);
-        let [low_low, high_low, low_high, high_high] =
-            [(a, b), (c, d), (e, f), (g, h)].map(|(a, b)| between(a, b, part(0)));
-        between(
-            between(low_low, high_low, part(1)),
-            between(low_high, high_high, part(1)),
-            part(2),
-        )
+        let low = between(between(a, b, x), between(c, d, x), y);
+        let high = between(between(e, f, x), between(g, h, x), y);
+        between(low, high, z)
     }
 
     /// The interpolant; positions outside are moved to the nearest face.
@@ -382,8 +426,7 @@ impl Volume {
         let Some((mut start, end)) = self.span_m(from_m, along) else {
             return;
         };
-        let on_ray = |t: f64| [0, 1, 2].map(|d| from_m[d] + t * along[d]);
-        let mut cell = self.cell(on_ray(start));
+        let mut cell = self.cell(point_on_ray(from_m, along, start));
         while start < end {
             // The face through which the ray leaves the cell.
             let mut leaves = (end, 0);
@@ -395,11 +438,11 @@ impl Volume {
                 }
             }
             let corners = self.corners(cell).map(f64::from);
-            let is_crossed =
-                |level: &f64| corners.iter().any(|v| (v < level) != (corners[0] < *level));
-            if levels.iter().any(is_crossed) {
-                for (at_m, level) in self.crossings(cell, on_ray, (start, leaves.0), levels) {
-                    if !met(at_m, level, self.normal(on_ray(at_m))) {
+            if levels.iter().any(|level| is_crossed(&corners, *level)) {
+                let part = (start, leaves.0);
+                for (at_m, level) in self.crossings(cell, from_m, along, part, levels) {
+                    let normal = self.normal(point_on_ray(from_m, along, at_m));
+                    if !met(at_m, level, normal) {
                         return;
                     }
                 }
@@ -419,32 +462,31 @@ impl Volume {
     fn crossings(
         &self,
         cell: [usize; 3],
-        on_ray: impl Fn(f64) -> [f64; 3],
+        from_m: [f64; 3],
+        along: [f64; 3],
         (start, end): (f64, f64),
         levels: &[f64],
     ) -> Vec<(f64, usize)> {
-        let is_below = |t: f64, wanted: f64| self.within(cell, on_ray(t)) < wanted;
-        let place = |step: u32| start + f64::from(step) / f64::from(STEPS) * (end - start);
-        let steps =
-            (0..STEPS).flat_map(|step| levels.iter().enumerate().map(move |level| (step, level)));
-        let crossing = |(step, (level, &wanted)): (u32, (usize, &f64))| {
-            let mut low = place(step);
-            let mut high = place(step + 1);
-            let below = is_below(low, wanted);
-            if below == is_below(high, wanted) {
-                return None;
-            }
-            for _ in 0..BISECTIONS {
-                let middle = 0.5 * (low + high);
-                if is_below(middle, wanted) == below {
-                    low = middle
-                } else {
-                    high = middle
+        let mut found = Vec::new();
+        for step in 0..STEPS {
+            for (index, level) in levels.iter().enumerate() {
+                let mut low = start + f64::from(step) / f64::from(STEPS) * (end - start);
+                let mut high = start + f64::from(step + 1) / f64::from(STEPS) * (end - start);
+                let is_below = self.within(cell, point_on_ray(from_m, along, low)) < *level;
+                if is_below == (self.within(cell, point_on_ray(from_m, along, high)) < *level) {
+                    continue;
                 }
+                for _ in 0..BISECTIONS {
+                    let middle = 0.5 * (low + high);
+                    let value = self.within(cell, point_on_ray(from_m, along, middle));
+                    match (value < *level) == is_below {
+                        true => low = middle,
+                        false => high = middle,
+                    }
+                }
+                found.push((0.5 * (low + high), index));
             }
-            Some((0.5 * (low + high), level))
-        };
-        let mut found: Vec<(f64, usize)> = steps.filter_map(crossing).collect();
+        }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found
     }
@@ -456,7 +498,8 @@ impl Volume {
             let reach_m = self.axis_m[d][cell[d] + 1] - self.axis_m[d][cell[d]];
             let mut low = at_m;
             let mut high = at_m;
-            (low[d], high[d]) = (low[d] - reach_m, high[d] + reach_m);
+            low[d] -= reach_m;
+            high[d] += reach_m;
             (self.at(low) - self.at(high)) / reach_m
         });
         let length = slope.iter().map(|s| s * s).sum::<f64>().sqrt();

@@ -154,14 +154,18 @@ impl MapPlot {
             true => ["across the flight [m]", "along the flight [m]"],
             false => ["distance [m]", "height [m]"],
         };
-        let scale = |label, range, paper| Scale {
-            label,
-            range,
+        let x = Scale {
+            label: x_label,
+            range: y_m,
             log: false,
-            paper,
+            paper: (frame.left, frame.right()),
         };
-        let x = scale(x_label, y_m, (frame.left, frame.right()));
-        let y = scale(y_label, z_m, (frame.bottom(), frame.top));
+        let y = Scale {
+            label: y_label,
+            range: z_m,
+            log: false,
+            paper: (frame.bottom(), frame.top),
+        };
         let size = (
             (frame.width * DENSITY) as u32,
             (frame.height * DENSITY) as u32,
@@ -185,22 +189,34 @@ impl MapPlot {
         }
         self.push_marks(&x, &y, &mut content);
         panel(&frame, [&x, &y], &self.title, content, font, out);
+        self.draw_bar(&frame, font, out)
+    }
+
+    /// The bar of colours beside the map.
+    fn draw_bar(&self, frame: &Frame, font: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
+        let (low, high) = self.colours.range();
         let bar = Frame {
             left: frame.right() + 18.0,
             width: 18.0,
-            ..frame
+            ..*frame
         };
-        let rows =
-            (0..BAR.1).map(|row| high - (f64::from(row) + 0.5) / f64::from(BAR.1) * (high - low));
-        let rgba = rows
-            .map(|value| self.colours.colour(value))
-            .flat_map(|[r, g, b]| [r, g, b, 255].repeat(BAR.0 as usize));
+        let mut rgba = Vec::with_capacity(4 * (BAR.0 * BAR.1) as usize);
+        for row in 0..BAR.1 {
+            let value = high - (f64::from(row) + 0.5) / f64::from(BAR.1) * (high - low);
+            let [r, g, b] = self.colours.colour(value);
+            rgba.extend([r, g, b, 255].repeat(BAR.0 as usize));
+        }
         out.push(Shape::Image {
             frame: bar,
-            pixels: pixels(BAR.0, BAR.1, rgba.collect())?,
+            pixels: pixels(BAR.0, BAR.1, rgba)?,
         });
         out.push(Shape::line(bar.outline(), INK, 1.2));
-        let scale = scale(&self.bar_label, (low, high), (bar.bottom(), bar.top));
+        let scale = Scale {
+            label: &self.bar_label,
+            range: (low, high),
+            log: false,
+            paper: (bar.bottom(), bar.top),
+        };
         axis(Side::Right, &scale, &bar, font, out);
         Ok(())
     }
@@ -238,9 +254,10 @@ impl MapPlot {
             let px = x.place(p.0);
             let py = y.place(p.1);
             for (colour, width) in [([255, 255, 255], 4.5), (INK, 2.0)] {
-                let arm =
-                    |d: f64| Shape::line([(px - 7.0, py - d), (px + 7.0, py + d)], colour, width);
-                out.extend([7.0, -7.0].map(arm));
+                for d in [7.0, -7.0] {
+                    let arm = [(px - 7.0, py - d), (px + 7.0, py + d)];
+                    out.push(Shape::line(arm, colour, width));
+                }
             }
         }
     }
@@ -375,43 +392,34 @@ impl Cells {
         if let Some(lidar_m) = self.lidar_m {
             let dy = y_m - lidar_m.0;
             let dz = z_m - lidar_m.1;
-            (first, second) = (dy.hypot(dz), dz.atan2(dy));
+            first = dy.hypot(dz);
+            second = dz.atan2(dy);
             // A full turn may begin anywhere.
             if self.second_edge.first().is_some_and(|edge| second < *edge) {
                 second += TAU;
             }
         }
-        let cell = |edges: &[f64], value: f64| {
-            let above = edges.partition_point(|edge| *edge <= value);
-            (above > 0 && above < edges.len()).then(|| above - 1)
-        };
-        Some(
-            cell(&self.second_edge, second)? * (self.first_edge_m.len() - 1)
-                + cell(&self.first_edge_m, first)?,
-        )
+        let row = cell_between(&self.second_edge, second)?;
+        let column = cell_between(&self.first_edge_m, first)?;
+        Some(row * (self.first_edge_m.len() - 1) + column)
     }
 
     /// Box around all cells: (left, right), (lowest, highest), m.
     pub fn extent_m(&self) -> ((f64, f64), (f64, f64)) {
-        let ends = || {
-            self.first_edge_m
-                .first()
-                .into_iter()
-                .chain(self.first_edge_m.last())
-        };
-        let corners = || {
-            self.second_edge
-                .iter()
-                .flat_map(move |second| ends().map(move |first| (*first, *second)))
-        };
-        let place = |(first, second): (f64, f64)| match self.lidar_m {
-            Some((y_m, z_m)) => (y_m + first * second.cos(), z_m + first * second.sin()),
-            None => (first, second),
-        };
-        (
-            extremes(corners().map(|c| place(c).0)),
-            extremes(corners().map(|c| place(c).1)),
-        )
+        let ends = [self.first_edge_m.first(), self.first_edge_m.last()];
+        let mut across_m = Vec::new();
+        let mut up_m = Vec::new();
+        for second in &self.second_edge {
+            for first in ends.into_iter().flatten() {
+                let (y_m, z_m) = match self.lidar_m {
+                    Some((y_m, z_m)) => (y_m + first * second.cos(), z_m + first * second.sin()),
+                    None => (*first, *second),
+                };
+                across_m.push(y_m);
+                up_m.push(z_m);
+            }
+        }
+        (extremes(across_m.into_iter()), extremes(up_m.into_iter()))
     }
 
     /// Picture of the box `y_m` x `z_m` with that many pixels; transparent outside the cells, the first row is the highest.
@@ -450,6 +458,12 @@ fn edges(centres: &[f64], half: f64) -> Vec<f64> {
     out.extend(centres.windows(2).map(|w| 0.5 * (w[0] + w[1])));
     out.push(1.5 * centres[n - 1] - 0.5 * centres[n - 2]);
     out
+}
+
+/// Index of the cell between edges that a value lies in.
+fn cell_between(edges: &[f64], value: f64) -> Option<usize> {
+    let above = edges.partition_point(|edge| *edge <= value);
+    (above > 0 && above < edges.len()).then(|| above - 1)
 }
 
 #[cfg(test)]

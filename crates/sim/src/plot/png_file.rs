@@ -20,14 +20,13 @@ const EMBOLDEN: f64 = 0.022;
 pub(crate) fn paint(drawing: &Drawing) -> OutputResult<Pixmap> {
     let [width, height] =
         [drawing.width, drawing.height].map(|length| (length * SCALE).round() as u32);
-    let refuse = || {
+    let mut pixmap = Pixmap::new(width, height).ok_or_else(|| {
         OutputError::value(
             "picture size",
             format!("{width} x {height}"),
             "1 to 32767 pixels each",
         )
-    };
-    let mut pixmap = Pixmap::new(width, height).ok_or_else(refuse)?;
+    })?;
     pixmap.fill(Color::WHITE);
     let mut painter = Painter {
         pixmap,
@@ -172,13 +171,16 @@ fn path(points: &[(f64, f64)]) -> Option<Path> {
     builder.finish()
 }
 
+fn refused(error: png::EncodingError) -> OutputError {
+    OutputError::unsupported("PNG", error)
+}
+
 /// PNG bytes of one picture, APNG bytes of several, with the provenance in iTXt chunks where it is given.
 pub(crate) fn encode(
     pictures: impl IntoIterator<Item = OutputResult<Pixmap>, IntoIter: ExactSizeIterator>,
     frame_s: f64,
     provenance: Option<&Provenance>,
 ) -> OutputResult<Vec<u8>> {
-    let refuse = |e: png::EncodingError| OutputError::unsupported("PNG", e);
     let mut pictures = pictures.into_iter();
     let count = pictures.len();
     let first = pictures
@@ -191,15 +193,15 @@ pub(crate) fn encode(
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Balanced);
     if count > 1 {
-        encoder.set_animated(count as u32, 0).map_err(refuse)?;
+        encoder.set_animated(count as u32, 0).map_err(refused)?;
         encoder
             .set_frame_delay((1000.0 * frame_s).round() as u16, 1000)
-            .map_err(refuse)?;
+            .map_err(refused)?;
     }
     for (key, text) in provenance.map(Provenance::entries).into_iter().flatten() {
-        encoder.add_itxt_chunk(key.into(), text).map_err(refuse)?;
+        encoder.add_itxt_chunk(key.into(), text).map_err(refused)?;
     }
-    let mut writer = encoder.write_header().map_err(refuse)?;
+    let mut writer = encoder.write_header().map_err(refused)?;
     for picture in std::iter::once(Ok(first)).chain(pictures) {
         let picture = picture?;
         if (picture.width(), picture.height()) != size {
@@ -212,9 +214,9 @@ pub(crate) fn encode(
         }
         writer
             .write_image_data(&picture.take_demultiplied())
-            .map_err(refuse)?;
+            .map_err(refused)?;
     }
-    writer.finish().map_err(refuse)?;
+    writer.finish().map_err(refused)?;
     Ok(bytes)
 }
 
