@@ -7,25 +7,37 @@ use crate::quantities;
 /// Memory that can be had without swapping, bytes: what the system says is available, or less where a control group or a limit
 /// of the shell (`ulimit -v`) leaves less. `None` where the system does not say.
 pub(crate) fn available_memory_bytes() -> Option<f64> {
-    let read = |path: &str| std::fs::read_to_string(path).ok();
-    let of_system = || kilobytes(&read("/proc/meminfo")?, "MemAvailable:");
-    let of_shell = || {
-        let limit = of_addresses(&read("/proc/self/limits")?)?;
-        Some(limit - kilobytes(&read("/proc/self/status")?, "VmSize:").unwrap_or(0.0))
-    };
-    let of_group = |[limit, usage]: [&str; 2]| Some(number(read(limit)?)? - number(read(usage)?)?);
-    let groups = [
-        ["/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"],
-        [
+    let limits = [
+        memory_of_system(),
+        memory_under_shell_limit(),
+        memory_of_group("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
+        memory_of_group(
             "/sys/fs/cgroup/memory/memory.limit_in_bytes",
             "/sys/fs/cgroup/memory/memory.usage_in_bytes",
-        ],
+        ),
     ];
-    let known = [of_system(), of_shell()]
-        .into_iter()
-        .chain(groups.map(of_group))
-        .flatten();
+    let known = limits.into_iter().flatten();
     known.map(|bytes| bytes.max(0.0)).reduce(f64::min)
+}
+
+fn read(path: &str) -> Option<String> {
+    std::fs::read_to_string(path).ok()
+}
+
+/// Memory that the system says is available, bytes.
+fn memory_of_system() -> Option<f64> {
+    kilobytes(&read("/proc/meminfo")?, "MemAvailable:")
+}
+
+/// What a limit of the shell leaves of the addresses, bytes.
+fn memory_under_shell_limit() -> Option<f64> {
+    let limit = of_addresses(&read("/proc/self/limits")?)?;
+    Some(limit - kilobytes(&read("/proc/self/status")?, "VmSize:").unwrap_or(0.0))
+}
+
+/// What the limit of a control group leaves, bytes, by the files of its limit and its usage.
+fn memory_of_group(limit: &str, usage: &str) -> Option<f64> {
+    Some(number(read(limit)?)? - number(read(usage)?)?)
 }
 
 /// Holds what a file asks for against the memory, before any of it is allocated.

@@ -11,7 +11,7 @@ use mpi::datatype::{Partition, PartitionMut};
 use mpi::environment::Universe;
 use mpi::topology::{Communicator as _, SimpleCommunicator};
 use mpi::{Count, Threading};
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 use wakescope_les::ranks::Ranks;
@@ -71,10 +71,7 @@ impl World {
 }
 
 fn refused(reason: &str) -> Error {
-    Error::Input {
-        path: PathBuf::from("mpirun"),
-        reason: reason.into(),
-    }
+    Error::input(Path::new("mpirun"), reason)
 }
 
 #[derive(Debug)]
@@ -111,14 +108,14 @@ impl Ranks for Processes {
 /// Lengths and starts of the parts of a message, as MPI counts them.
 fn parts(lengths: &[usize]) -> Result<(Vec<Count>, Vec<Count>), wakescope_les::Error> {
     let mut end = 0;
-    let start = |length: &usize| {
-        let start = end;
+    let mut counts = Vec::with_capacity(lengths.len());
+    let mut starts = Vec::with_capacity(lengths.len());
+    for length in lengths {
+        counts.push(*length as Count);
+        starts.push(end as Count);
         end += length;
-        start as Count
-    };
-    let starts = lengths.iter().map(start).collect();
-    let most = Count::MAX as usize;
-    if end > most {
+    }
+    if end > Count::MAX as usize {
         let field = "values in a message between ranks";
         let allowed = "at most 2147483647: take more ranks";
         return Err(wakescope_les::Error::OutOfRange {
@@ -127,8 +124,5 @@ fn parts(lengths: &[usize]) -> Result<(Vec<Count>, Vec<Count>), wakescope_les::E
             allowed,
         });
     }
-    Ok((
-        lengths.iter().map(|length| *length as Count).collect(),
-        starts,
-    ))
+    Ok((counts, starts))
 }

@@ -95,11 +95,11 @@ impl Report {
             on_meshes.push(Trial::run(mesh, *spacing, observer)?);
         }
         let given = &on_meshes[0];
-        let is_known = |metric: &Metric| {
+        let mut available = METRICS.to_vec();
+        available.retain(|metric| {
             let values = given.series(*metric).unwrap_or_default();
             values.iter().any(|x| x.is_finite() && *x != 0.0)
-        };
-        let available: Vec<Metric> = METRICS.into_iter().filter(is_known).collect();
+        });
         let mut report = Self {
             subject: "case",
             provenance: file.provenance(),
@@ -116,20 +116,23 @@ impl Report {
         let short = Trial::run(&shorter_file, shorter, observer)?;
         let long = Trial::run(&longer_file, longer, observer)?;
         observer.end();
-        let cells = meshes.iter().zip(&on_meshes).map(|((_, mesh), trial)| {
+        let mut rows = Vec::with_capacity(meshes.len());
+        for ((_, mesh), trial) in meshes.iter().zip(&on_meshes) {
             let cells = mesh.content.case.cells();
             let [nx, ny, nz] = cells;
             let label = format!("{nx} x {ny} x {nz}");
-            (trial.row(count(cells), label), trial)
-        });
-        report.add(CELLS, count(file.content.case.cells()), cells.collect());
-        let steps = [
+            rows.push((trial.row(count(cells), label), trial));
+        }
+        report.add(CELLS, count(file.content.case.cells()), rows);
+        let mut rows = Vec::with_capacity(1 + STEPS.len());
+        for (value, trial) in [
             (shorter_step, &short),
             (given_step, given),
             (longer_step, &long),
-        ];
-        let steps = steps.map(|(value, trial)| (trial.row(value, float_text(value)), trial));
-        report.add(key, given_step, steps.into());
+        ] {
+            rows.push((trial.row(value, float_text(value)), trial));
+        }
+        report.add(key, given_step, rows);
         Ok(report)
     }
 
@@ -196,24 +199,23 @@ fn meshes(file: &CaseFile) -> Result<Vec<(f64, CaseFile)>, Error> {
 /// is its difference from the next, those of the others their differences from the finest besides.
 fn richardson(spacings: &[f64], series: &[&[f64]]) -> (Option<f64>, Vec<f64>) {
     let count = series.iter().map(|own| own.len()).min().unwrap_or(0);
-    let times: Vec<usize> = (0..count)
-        .filter(|t| series.iter().all(|own| own[*t].is_finite()))
-        .collect();
-    if series.len() < 2 || times.is_empty() {
+    // At the times that all of them have.
+    let mut common = vec![Vec::new(); series.len()];
+    for time in 0..count {
+        if series.iter().all(|own| own[time].is_finite()) {
+            for (values, own) in common.iter_mut().zip(series) {
+                values.push(own[time]);
+            }
+        }
+    }
+    if series.len() < 2 || common[0].is_empty() {
         return (None, vec![f64::NAN; series.len()]);
     }
-    let difference = |a: usize, b: usize| -> Vec<f64> {
-        times
-            .iter()
-            .map(|t| series[b][*t] - series[a][*t])
-            .collect()
-    };
-    let finest: Vec<f64> = times.iter().map(|t| series[0][*t]).collect();
-    let scale = norm(&finest);
-    let first = difference(0, 1);
+    let scale = norm(&common[0]);
+    let first = difference(&common[1], &common[0]);
     let mut from_finest = vec![norm(&first) / scale];
-    for i in 1..series.len() {
-        from_finest.push(from_finest[0] + norm(&difference(0, i)) / scale);
+    for other in &common[1..] {
+        from_finest.push(from_finest[0] + norm(&difference(other, &common[0])) / scale);
     }
     let [h1, h2, h3] = *spacings else {
         return (None, from_finest);
@@ -221,26 +223,39 @@ fn richardson(spacings: &[f64], series: &[&[f64]]) -> (Option<f64>, Vec<f64>) {
     if from_finest.iter().all(|error| *error < ROUNDING) {
         return (Some(f64::INFINITY), from_finest);
     }
-    let second = difference(1, 2);
+    let second = difference(&common[2], &common[1]);
     let cosine = product(&first, &second) / (norm(&first) * norm(&second));
     let measured = norm(&second) / norm(&first);
-    let ratio = |p: f64| (h3.powf(p) - h2.powf(p)) / (h2.powf(p) - h1.powf(p));
     let [mut low, mut high] = ORDERS;
     // A ratio or cosine that is not a number does not converge either.
-    let converges = cosine >= SAME_SHAPE && measured >= ratio(low) && measured <= ratio(high);
+    let converges = cosine >= SAME_SHAPE
+        && measured >= error_ratio([h1, h2, h3], low)
+        && measured <= error_ratio([h1, h2, h3], high);
     if !converges {
         return (None, from_finest);
     }
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if ratio(middle) < measured {
+        if error_ratio([h1, h2, h3], middle) < measured {
             low = middle;
         } else {
             high = middle;
         }
     }
-    let error = |h: &f64| from_finest[0] * h.powf(low) / (h2.powf(low) - h1.powf(low));
-    (Some(low), spacings.iter().map(error).collect())
+    let mut errors = Vec::with_capacity(spacings.len());
+    for h in spacings {
+        errors.push(from_finest[0] * h.powf(low) / (h2.powf(low) - h1.powf(low)));
+    }
+    (Some(low), errors)
+}
+
+/// Difference between the second and third solution over that between the first and second, for an order of the errors.
+fn error_ratio([h1, h2, h3]: [f64; 3], order: f64) -> f64 {
+    (h3.powf(order) - h2.powf(order)) / (h2.powf(order) - h1.powf(order))
+}
+
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
 fn product(a: &[f64], b: &[f64]) -> f64 {

@@ -40,13 +40,13 @@ pub(super) fn value(scene: &Scene, key: &str) -> f64 {
 pub fn with(file: &SceneFile, key: &'static str, number: f64) -> Result<SceneFile, Error> {
     let scene = &file.content;
     let mut table = to_table(scene);
-    let whole = |number: f64| Value::Integer(number.round() as i64);
     if key == GRID_SPACING {
         let width_m = value(scene, GRID_POINTS) * value(scene, GRID_SPACING);
-        set(&mut table, GRID_POINTS, whole(width_m / number));
+        let points = (width_m / number).round() as i64;
+        set(&mut table, GRID_POINTS, Value::Integer(points));
         set(&mut table, key, Value::Float(number));
     } else {
-        set(&mut table, key, whole(number));
+        set(&mut table, key, Value::Integer(number.round() as i64));
     }
     let changed = from_table(table).ok_or_else(|| Error::Key {
         key,

@@ -135,11 +135,12 @@ impl Sample {
 
     /// Whether each cell has an estimate in every realisation.
     fn known(&self) -> Vec<bool> {
-        let is_known = |cell: usize| {
-            let finite = self.error_m_s.iter().all(|scan| scan[cell].is_finite());
-            finite && self.offset_m_s[cell].is_finite()
-        };
-        (0..self.offset_m_s.len()).map(is_known).collect()
+        let mut known = Vec::with_capacity(self.offset_m_s.len());
+        for (cell, offset_m_s) in self.offset_m_s.iter().enumerate() {
+            let are_finite = self.error_m_s.iter().all(|scan| scan[cell].is_finite());
+            known.push(are_finite && offset_m_s.is_finite());
+        }
+        known
     }
 
     /// Fraction of the cells known to `reference` that this run has no estimate of.
@@ -232,12 +233,19 @@ impl Sample {
                 *out += square(metric, all - 1.0, sum - e, squares - e * e, offset);
             }
         }
-        let root_mean = |sum: f64| (sum / count).max(0.0).sqrt();
+        for sum in &mut without {
+            *sum = root_mean(*sum, count);
+        }
         Jackknife {
-            all: root_mean(total),
-            without: without.into_iter().map(root_mean).collect(),
+            all: root_mean(total, count),
+            without,
         }
     }
+}
+
+/// Root of the mean of a sum over a count; 0 for a sum that rounding makes negative.
+fn root_mean(sum: f64, count: f64) -> f64 {
+    (sum / count).max(0.0).sqrt()
 }
 
 /// Unbiased square of the bias, of the standard deviation or of the error of a cell, from `n` errors.

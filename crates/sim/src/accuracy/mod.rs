@@ -23,6 +23,7 @@ use crate::Error;
 use crate::io::Provenance;
 use crate::sweep::front::front;
 use metrics::Metric;
+use std::path::Path;
 use wakescope_estimate::Measured;
 
 /// What is requested of a report.
@@ -47,22 +48,21 @@ impl Request {
     /// A metric that is requested and that the subject does not have; no metric at all.
     fn select(&self, subject: &str, available: &[Metric]) -> Result<Vec<Metric>, Error> {
         let names: Vec<&str> = available.iter().map(|metric| metric.name()).collect();
-        let refuse = |reason: String| Error::Input {
-            path: "--of".into(),
-            reason,
-        };
         if let Some(metric) = self.of.iter().find(|metric| !available.contains(metric)) {
             let name = metric.name();
             let known = names.join(", ");
-            return Err(refuse(format!(
-                "{name} is no metric of this {subject}, which has: {known}"
-            )));
+            return Err(Error::input(
+                Path::new("--of"),
+                format!("{name} is no metric of this {subject}, which has: {known}"),
+            ));
         }
         if available.is_empty() {
-            return Err(refuse(format!("this {subject} has no metric")));
+            let reason = format!("this {subject} has no metric");
+            return Err(Error::input(Path::new("--of"), reason));
         }
-        let is_requested = |metric: &Metric| self.of.is_empty() || self.of.contains(metric);
-        Ok(available.iter().copied().filter(is_requested).collect())
+        let mut requested = available.to_vec();
+        requested.retain(|metric| self.of.is_empty() || self.of.contains(metric));
+        Ok(requested)
     }
 }
 

@@ -44,13 +44,12 @@ impl Report {
                 plot = plot.with(Series::new(name, Style::LineMarkers, points).in_colour(colour));
             }
         }
-        let on_front = self.front(metric);
-        let mut front: Vec<(f64, f64)> = self
-            .rows()
-            .zip(on_front)
-            .filter(|(_, is_on_front)| *is_on_front)
-            .filter_map(|((_, row), _)| Some((row.run_s, drawn(row.shift(metric)?))))
-            .collect();
+        let mut front = Vec::new();
+        for ((_, row), is_on_front) in self.rows().zip(self.front(metric)) {
+            if is_on_front && let Some(shift) = row.shift(metric) {
+                front.push((row.run_s, drawn(shift)));
+            }
+        }
         front.sort_by(|a, b| a.0.total_cmp(&b.0));
         let colour = self.settings.len();
         plot = plot.with(Series::new("front", Style::Dash, front).in_colour(colour));

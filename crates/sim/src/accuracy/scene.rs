@@ -24,7 +24,7 @@ use crate::scene::{Method, Pattern, Scene, SceneFile, ScreenSampling};
 use crate::sweep::Common;
 use std::time::Instant;
 use wakescope_estimate::Measured;
-use wakescope_optics::plan::{LayerGap, Model};
+use wakescope_optics::plan::Model;
 
 /// Fewest realisations of the scan for a standard error by the jackknife.
 const FEWEST_REALISATIONS: usize = 8;
@@ -221,11 +221,12 @@ impl<'a> Study<'a> {
         let mut scene = self.base.content.clone();
         scene.pulse.energy_j *= 1.0 + RAISED;
         let raised = self.run(&self.base.with(scene)?)?.sample;
-        let response = |metric| {
+        let mut response = Vec::new();
+        for metric in self.of_map() {
             let shift = raised.shift(&self.given.sample, metric);
-            (metric, shift.times(Measured::exact(1.0 / RAISED)))
-        };
-        Ok(self.of_map().map(response).collect())
+            response.push((metric, shift.times(Measured::exact(1.0 / RAISED))));
+        }
+        Ok(response)
     }
 
     /// The settings with their values from the finest to the coarsest, the given one among them.
@@ -308,10 +309,7 @@ impl<'a> Study<'a> {
         trial: &Trial,
         finest: &Trial,
     ) -> Vec<(Metric, Measured)> {
-        let noise = |metric| Measured {
-            value: 0.0,
-            std: self.given.sample.noise(metric) * ratio.sqrt(),
-        };
+        let mut shifts = Vec::new();
         match key {
             LAYERS => {
                 let [middle, largest] = trial.layer_shift.map(Measured::exact);
@@ -322,17 +320,29 @@ impl<'a> Study<'a> {
                 self.by_efficiency(shift, shift)
             }
             PATHS => {
-                let noise = noise(Metric::Efficiency);
+                let noise = self.noise(Metric::Efficiency, ratio);
                 self.by_efficiency(noise, noise)
             }
-            REALISATIONS => self
-                .of_map()
-                .map(|metric| (metric, noise(metric)))
-                .collect(),
-            _ => self
-                .of_map()
-                .map(|metric| (metric, trial.sample.shift(&finest.sample, metric)))
-                .collect(),
+            REALISATIONS => {
+                for metric in self.of_map() {
+                    shifts.push((metric, self.noise(metric, ratio)));
+                }
+                shifts
+            }
+            _ => {
+                for metric in self.of_map() {
+                    shifts.push((metric, trial.sample.shift(&finest.sample, metric)));
+                }
+                shifts
+            }
+        }
+    }
+
+    /// Standard error of a metric of the base run, in a run with fewer realisations by this ratio.
+    fn noise(&self, metric: Metric, ratio: f64) -> Measured {
+        Measured {
+            value: 0.0,
+            std: self.given.sample.noise(metric) * ratio.sqrt(),
         }
     }
 
@@ -358,25 +368,28 @@ fn efficiency_in_the_middle(optics: &LineOptics<'_>) -> Result<Vec<f64>, Error> 
     let middle_m = middle_m(optics.plan);
     let mean = optics.efficiency_at(&[middle_m])?.mean[0];
     let screens = optics.screens(ends_m)?;
-    let each: Vec<f64> = screens
-        .realisations
-        .iter()
-        .map(|over_mean| mean * interpolate(&screens.range_m, over_mean, middle_m))
-        .collect();
-    let group_mean = |group: &[f64]| group.iter().sum::<f64>() / group.len() as f64;
-    Ok(each.chunks(GROUP).map(group_mean).collect())
+    let mut means = Vec::new();
+    for group in screens.realisations.chunks(GROUP) {
+        let values = group
+            .iter()
+            .map(|over_mean| mean * interpolate(&screens.range_m, over_mean, middle_m));
+        means.push(values.sum::<f64>() / group.len() as f64);
+    }
+    Ok(means)
 }
 
 /// Relative shift of the bistatic efficiency by the phase screens of a plan, in the middle of the scan and the largest over its stretch.
 fn layer_shift(plan: &Plan) -> [f64; 2] {
     let middle_m = middle_m(plan);
-    let reaches = |gaps: &&[LayerGap]| gaps.last().is_some_and(|gap| gap.range_m >= middle_m);
-    let mut stretches = plan.screens.iter().map(|screens| screens.gaps.as_slice());
-    let Some(gaps) = stretches.find(reaches) else {
+    let mut stretches = plan.screens.iter();
+    let Some(screens) = stretches.find(|screens| {
+        let last = screens.gaps.last();
+        last.is_some_and(|gap| gap.range_m >= middle_m)
+    }) else {
         return [f64::NAN; 2];
     };
-    let range_m: Vec<f64> = gaps.iter().map(|gap| gap.range_m).collect();
-    let relative: Vec<f64> = gaps.iter().map(|gap| gap.relative).collect();
+    let range_m: Vec<f64> = screens.gaps.iter().map(|gap| gap.range_m).collect();
+    let relative: Vec<f64> = screens.gaps.iter().map(|gap| gap.relative).collect();
     let largest = relative.iter().fold(0.0, |most, gap| gap.abs().max(most));
     [interpolate(&range_m, &relative, middle_m), largest]
 }

@@ -58,33 +58,42 @@ impl Report {
 
     /// The table `setting,value,metric,shift,standard_error,status,run_s,front,cheapest`: a row for each metric of each value.
     pub fn table(&self) -> Table {
-        let mut cells = Vec::new();
+        let mut settings = Vec::new();
+        let mut values = Vec::new();
+        let mut metrics = Vec::new();
+        let mut shifts = Vec::new();
+        let mut standard_errors = Vec::new();
+        let mut statuses = Vec::new();
+        let mut run_s = Vec::new();
+        let mut front = Vec::new();
+        let mut cheapest = Vec::new();
         for metric in &self.metrics {
-            for ((setting, row), on_front) in self.rows().zip(self.front(*metric)) {
+            for ((setting, row), is_on_front) in self.rows().zip(self.front(*metric)) {
                 let shift = row.shift(*metric);
-                if shift.is_some() || row.refused.is_some() {
-                    let unknown = Measured {
-                        value: f64::NAN,
-                        std: f64::NAN,
-                    };
-                    cells.push((setting, row, metric, shift.unwrap_or(unknown), on_front));
+                if shift.is_none() && row.refused.is_none() {
+                    continue;
                 }
+                settings.push(setting.key);
+                values.push(row.value);
+                metrics.push(metric.name());
+                shifts.push(shift.map_or(f64::NAN, |shift| shift.value));
+                standard_errors.push(shift.map_or(f64::NAN, |shift| shift.std));
+                statuses.push(self.status(row));
+                run_s.push(row.run_s);
+                front.push(i64::from(is_on_front));
+                cheapest.push(i64::from(self.is_cheapest(setting, row)));
             }
         }
-        let cheapest = |setting: &Setting, row| i64::from(self.is_cheapest(setting, row));
         Table::new()
-            .text("setting", cells.iter().map(|cell| cell.0.key))
-            .float("value", cells.iter().map(|cell| cell.1.value))
-            .text("metric", cells.iter().map(|cell| cell.2.name()))
-            .float("shift", cells.iter().map(|cell| cell.3.value))
-            .float("standard_error", cells.iter().map(|cell| cell.3.std))
-            .text("status", cells.iter().map(|cell| self.status(cell.1)))
-            .float("run_s", cells.iter().map(|cell| cell.1.run_s))
-            .int("front", cells.iter().map(|cell| i64::from(cell.4)))
-            .int(
-                "cheapest",
-                cells.iter().map(|cell| cheapest(cell.0, cell.1)),
-            )
+            .text("setting", settings)
+            .float("value", values)
+            .text("metric", metrics)
+            .float("shift", shifts)
+            .float("standard_error", standard_errors)
+            .text("status", statuses)
+            .float("run_s", run_s)
+            .int("front", front)
+            .int("cheapest", cheapest)
     }
 
     /// The report for people.
@@ -134,7 +143,11 @@ impl Report {
     }
 
     fn aligned(&self) -> String {
-        let label = |(setting, row): (&Setting, &Row)| {
+        let mut settings = Vec::new();
+        let mut labels = Vec::new();
+        let mut runs = Vec::new();
+        let mut statuses = Vec::new();
+        for (setting, row) in self.rows() {
             let given = if row.value == setting.given {
                 " (given)"
             } else {
@@ -145,22 +158,27 @@ impl Report {
             } else {
                 " "
             };
-            format!("{}{given}{mark}", row.label)
-        };
-        let mut table = Table::new()
-            .text("setting", self.rows().map(|(setting, _)| setting.key))
-            .text("value ", self.rows().map(label))
-            .text("run", self.rows().map(|(_, row)| run_text(row)));
-        for metric in &self.metrics {
-            let cell = |(_, row): (_, &Row)| row.shift(*metric).map_or("-".into(), shift_text);
-            table = table.text(metric.name(), self.rows().map(cell));
+            settings.push(setting.key);
+            labels.push(format!("{}{given}{mark}", row.label));
+            runs.push(run_text(row));
+            // The reason of a refusal follows the table.
+            statuses.push(match row.refused {
+                Some(_) => "refused".into(),
+                None => self.status(row),
+            });
         }
-        // The reason of a refusal follows the table.
-        let short = |(_, row): (_, &Row)| match row.refused {
-            Some(_) => "refused".into(),
-            None => self.status(row),
-        };
-        table.text("status", self.rows().map(short)).aligned()
+        let mut table = Table::new()
+            .text("setting", settings)
+            .text("value ", labels)
+            .text("run", runs);
+        for metric in &self.metrics {
+            let mut cells = Vec::new();
+            for (_, row) in self.rows() {
+                cells.push(row.shift(*metric).map_or("-".into(), shift_text));
+            }
+            table = table.text(metric.name(), cells);
+        }
+        table.text("status", statuses).aligned()
     }
 }
 

@@ -179,34 +179,32 @@ impl<'s> Checker<'s> {
         ok
     }
 
-    /// Two keys of the same unit, of which the first is `word` the second: "above", "below", "at least" or "at most".
+    /// Two keys of the same unit, of which the first is `relation` the second: "above", "below", "at least" or "at most".
     pub(crate) fn compare<T: PartialOrd + Debug + Display>(
         &mut self,
         keys: [&str; 2],
         values: [T; 2],
-        word: &str,
+        relation: &str,
     ) -> bool {
         let [a, b] = &values;
-        let (ok, reverse) = match word {
+        let (is_fulfilled, reverse) = match relation {
             "above" => (a > b, "below"),
             "below" => (a < b, "above"),
             "at least" => (a >= b, "at most"),
             _ => (a <= b, "at least"),
         };
-        let side = |i: usize, word: &str| {
-            let other = format!(
-                "{word} {}, {} {}",
-                keys[1 - i],
-                values[1 - i],
-                unit_of(keys[0]).unwrap_or_default()
-            );
+        let unit = unit_of(keys[0]).unwrap_or_default();
+        let allowed = format!("{relation} {}, {b} {unit}", keys[1]);
+        let reverse_allowed = format!("{reverse} {}, {a} {unit}", keys[0]);
+        let sides = [
+            (keys[0], format!("{a:?}"), allowed.trim_end().to_owned()),
             (
-                keys[i],
-                format!("{:?}", values[i]),
-                other.trim_end().to_owned(),
-            )
-        };
-        self.between(ok, &[side(0, word), side(1, reverse)])
+                keys[1],
+                format!("{b:?}"),
+                reverse_allowed.trim_end().to_owned(),
+            ),
+        ];
+        self.between(is_fulfilled, &sides)
     }
 
     /// A limit between keys: the first that the file states has to give way, or else the first.

@@ -75,11 +75,14 @@ pub enum SceneError {
 const MOST_LINES: usize = 50;
 
 fn list(path: &Path, problems: &[Located]) -> String {
-    let of = |Located { problem, line }: &Located| match line {
-        Some(line) => format!("{}:{line}: {problem}", path.display()),
-        None => format!("{}: {problem}", path.display()),
-    };
-    let mut lines: Vec<String> = problems.iter().take(MOST_LINES).map(of).collect();
+    let path = path.display();
+    let mut lines = Vec::new();
+    for Located { problem, line } in problems.iter().take(MOST_LINES) {
+        lines.push(match line {
+            Some(line) => format!("{path}:{line}: {problem}"),
+            None => format!("{path}: {problem}"),
+        });
+    }
     if problems.len() > MOST_LINES {
         lines.push(format!("and {} more", problems.len() - MOST_LINES));
     }

@@ -36,12 +36,12 @@ impl<'a> Text<'a> {
     /// # Errors
     /// The line and what is wrong, without the text that is there.
     pub(crate) fn parse(text: &'a str, path: &'a Path) -> Result<Self, SceneError> {
-        let breaks: Vec<usize> = text
-            .bytes()
-            .enumerate()
-            .filter(|(_, b)| *b == b'\n')
-            .map(|(at, _)| at)
-            .collect();
+        let mut breaks = Vec::new();
+        for (index, byte) in text.bytes().enumerate() {
+            if byte == b'\n' {
+                breaks.push(index);
+            }
+        }
         match DeTable::parse(text) {
             Ok(table) => Ok(Self {
                 text,
@@ -49,32 +49,17 @@ impl<'a> Text<'a> {
                 table: table.into_inner(),
                 breaks,
             }),
-            Err(e) => {
-                let at = e.span().map_or(0, |span| span.start);
-                let before = text
-                    .get(..at)
-                    .unwrap_or_default()
-                    .lines()
-                    .next_back()
-                    .unwrap_or_default();
-                let key = before.split_once('=').map(|(key, _)| key.trim());
-                let is_bare = |key: &&str| {
-                    key.bytes()
-                        .all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b))
-                };
-                let place = key
-                    .filter(is_bare)
-                    .map(|key| format!("{}: ", quote(key)))
-                    .unwrap_or_default();
-                let message = format!(
-                    "{place}this is no valid TOML: {}",
-                    e.message().replace('\n', " ")
-                );
-                let line = breaks.partition_point(|end| *end < at) + 1;
+            Err(error) => {
+                let index = error.span().map_or(0, |span| span.start);
+                let key = key_before(text, index).map(|key| format!("{}: ", quote(key)));
                 Err(SceneError::Malformed {
                     path: path.to_owned(),
-                    line,
-                    message,
+                    line: breaks.partition_point(|end| *end < index) + 1,
+                    message: format!(
+                        "{}this is no valid TOML: {}",
+                        key.unwrap_or_default(),
+                        error.message().replace('\n', " ")
+                    ),
                 })
             }
         }
@@ -174,7 +159,8 @@ impl<'a> Text<'a> {
 
     /// Problems with the lines where the text states their keys, and values as it writes them.
     pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
-        let locate = |mut problem: Problem| {
+        let mut located = Vec::with_capacity(problems.len());
+        for mut problem in problems {
             if let Some(written) = self.written(&problem.key) {
                 problem.value = written;
             } else if self.line(&problem.key).is_none()
@@ -182,12 +168,12 @@ impl<'a> Text<'a> {
             {
                 problem.value += " (the default)";
             }
-            Located {
+            located.push(Located {
                 line: self.line_near(&problem.key),
                 problem,
-            }
-        };
-        self.invalid(problems.into_iter().map(locate).collect())
+            });
+        }
+        self.invalid(located)
     }
 
     fn invalid(&self, mut problems: Vec<Located>) -> SceneError {
@@ -235,7 +221,7 @@ fn number(value: &DeValue<'_>) -> Option<f64> {
                 .then_some(number)
         }
         DeValue::Integer(value) if value.radix() == 10 => value.as_str().parse().ok(),
-        DeValue::Integer(_) => whole(value).map(|whole| whole as f64),
+        DeValue::Integer(_) => whole(value).map(|number| number as f64),
         _ => None,
     }
 }
@@ -245,6 +231,33 @@ fn whole(value: &DeValue<'_>) -> Option<i64> {
         return None;
     };
     i64::from_str_radix(value.as_str(), value.radix()).ok()
+}
+
+/// A whole number from 0 to the largest one.
+fn whole_up_to(value: &DeValue<'_>, largest: u64) -> Option<i64> {
+    let number = whole(value)?;
+    let is_allowed = u64::try_from(number).is_ok_and(|number| number <= largest);
+    is_allowed.then_some(number)
+}
+
+/// The bare key of the line that a text has before an index.
+fn key_before(text: &str, index: usize) -> Option<&str> {
+    let before = text.get(..index)?.lines().next_back()?;
+    let (key, _) = before.split_once('=')?;
+    let key = key.trim();
+    let is_bare = key
+        .bytes()
+        .all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b));
+    is_bare.then_some(key)
+}
+
+/// The value of a key in a text with examples, if it is of this kind; empty lists are no examples.
+fn value_in_example(text: &str, path: &str, kind: &Kind) -> Option<String> {
+    let document = Text::parse(text, Path::new("")).ok()?;
+    let (_, value) = find(&document.table, path)?;
+    let has_values = value.get_ref().as_array().map(|values| !values.is_empty());
+    let fits = has_values == matches!(kind, Kind::List { .. }).then_some(true);
+    fits.then(|| document.quote(value.span()))
 }
 
 /// The kinds that a table may have, each with its keys.
@@ -308,24 +321,21 @@ impl Walk<'_> {
             line,
             defaults,
         } = at;
-        let default = |name: &str| defaults.and_then(|d| d.get(name));
         let mut out = toml::Table::new();
         for (name, value) in table {
             let here = name.get_ref().as_ref();
             let line = self.document.line_of(&name.span());
             match keys.iter().find(|key| key.name == here) {
                 Some(key) => {
-                    let defaults = default(here).and_then(Value::as_table);
-                    let read = self.value(
-                        &key.kind,
-                        value,
-                        Place {
-                            path: &join(path, here),
-                            line,
-                            defaults,
-                        },
-                    );
-                    out.extend(read.map(|value| (here.to_owned(), value)));
+                    let defaults = defaults.and_then(|all| all.get(here)?.as_table());
+                    let place = Place {
+                        path: &join(path, here),
+                        line,
+                        defaults,
+                    };
+                    if let Some(value) = self.value(&key.kind, value, place) {
+                        out.insert(here.to_owned(), value);
+                    }
                 }
                 None if kinds.is_some_and(|(tag, ..)| tag == here) => {}
                 None => {
@@ -339,35 +349,33 @@ impl Walk<'_> {
                 }
             }
         }
-        for key in keys
-            .iter()
-            .filter(|key| key.is_required && !table.contains_key(key.name))
-        {
-            match default(key.name) {
-                Some(default) => out.extend([(key.name.to_owned(), default.clone())]),
-                None => {
-                    let path = join(path, key.name);
-                    // Of a table with a tag, the tag is what must be said.
-                    let (path, allowed) = match &key.kind {
-                        Kind::Tagged { tag, kinds } => {
-                            (join(&path, tag), one_of(&names(kinds), ""))
-                        }
-                        kind => (path.clone(), self.wanted(&path, kind, "")),
-                    };
-                    self.refuse(path, Problem::ABSENT.into(), allowed, line);
-                }
+        for key in keys {
+            if !key.is_required || table.contains_key(key.name) {
+                continue;
+            }
+            match defaults.and_then(|all| all.get(key.name)) {
+                Some(default) => drop(out.insert(key.name.to_owned(), default.clone())),
+                None => self.refuse_missing(key, path, line),
             }
         }
         out
+    }
+
+    /// Refuses a table without a key that has no default; of a table with a tag, the tag must be stated.
+    fn refuse_missing(&mut self, key: &Key, path: &str, line: usize) {
+        let path = join(path, key.name);
+        let (path, allowed) = match &key.kind {
+            Kind::Tagged { tag, kinds } => (join(&path, tag), one_of(&names(kinds), "")),
+            kind => (path.clone(), self.wanted(&path, kind, "")),
+        };
+        self.refuse(path, Problem::ABSENT.into(), allowed, line);
     }
 
     fn value(&mut self, kind: &Kind, value: &Spanned<DeValue<'_>>, at: Place<'_>) -> Option<Value> {
         let inner = value.get_ref();
         let read = match (kind, inner) {
             (Kind::Number, _) => number(inner).map(Value::Float),
-            (Kind::Whole { largest }, _) => whole(inner)
-                .filter(|w| u64::try_from(*w).is_ok_and(|w| w <= *largest))
-                .map(Value::Integer),
+            (Kind::Whole { largest }, _) => whole_up_to(inner, *largest).map(Value::Integer),
             (Kind::Switch, DeValue::Boolean(value)) => Some(Value::Boolean(*value)),
             (Kind::Text, DeValue::String(text)) => Some(Value::String(text.to_string())),
             (Kind::Choice(names), DeValue::String(text))
@@ -464,13 +472,15 @@ impl Walk<'_> {
 
     /// What to write in place of a key that is not known in the table at `path`.
     fn unknown(&self, keys: &[Key], here: &str, path: &str, kinds: Option<Kinds<'_>>) -> String {
+        let mut known = Vec::new();
         if let Some((tag, chosen, all)) = kinds {
-            let has = |(_, keys): &&(&str, Vec<Key>)| keys.iter().any(|key| key.name == here);
-            let others: Vec<String> = all
-                .iter()
-                .filter(has)
-                .map(|(name, _)| format!("\"{name}\""))
-                .collect();
+            known.push(tag);
+            let mut others = Vec::new();
+            for (name, keys) in all {
+                if keys.iter().any(|key| key.name == here) {
+                    others.push(format!("\"{name}\""));
+                }
+            }
             if !others.is_empty() {
                 let tag = join(path, tag);
                 let needed = others.join(" or ");
@@ -493,12 +503,11 @@ impl Walk<'_> {
             (None, Some(table)) => format!("; it is a key of [{table}]."),
             (None, None) => ".".into(),
         };
-        let known: Vec<&str> = kinds
-            .iter()
-            .map(|(tag, ..)| *tag)
-            .chain(keys.iter().map(|key| key.name))
-            .collect();
-        format!("there is no such key{hint} Memo here: {}", known.join(", "))
+        known.extend(keys.iter().map(|key| key.name));
+        format!(
+            "there is no such key{hint} Known here: {}",
+            known.join(", ")
+        )
     }
 
     /// What a key takes in place of what is written, with an example.
@@ -554,29 +563,27 @@ impl Walk<'_> {
 impl Format<'_> {
     /// The value of a key in the texts with examples, or its default; of a list also one of its values, `key[0]`.
     pub(crate) fn example(&self, path: &str, kind: &Kind) -> Option<String> {
-        let (whole, element) = path
+        let (whole, is_element) = path
             .split_once('[')
             .map_or((path, false), |(whole, _)| (whole, true));
-        let at = if element {
+        let path = if is_element {
             format!("{whole}[0]")
         } else {
             whole.to_owned()
         };
-        let of_text = |text: &&str| {
-            let document = Text::parse(text, Path::new("")).ok()?;
-            let (_, value) = find(&document.table, &at)?;
-            let has_values = value.get_ref().as_array().map(|values| !values.is_empty());
-            let fits = has_values == matches!(kind, Kind::List { .. }).then_some(true);
-            fits.then(|| document.quote(value.span()))
-        };
-        let of_defaults = || {
-            let mut keys = whole.split('.');
-            let section = keys.next().and_then(|section| self.defaults.get(section))?;
-            let value = keys.try_fold(section, |table, key| table.get(key))?;
-            let plain = !value.is_array() && !value.is_table() && !element;
-            plain.then(|| value.to_string())
-        };
-        self.examples.iter().find_map(of_text).or_else(of_defaults)
+        let mut examples = self.examples.iter();
+        examples
+            .find_map(|text| value_in_example(text, &path, kind))
+            .or_else(|| self.plain_default(whole).filter(|_| !is_element))
+    }
+
+    /// The default of a key that is neither a list nor a table.
+    fn plain_default(&self, path: &str) -> Option<String> {
+        let mut keys = path.split('.');
+        let section = self.defaults.get(keys.next()?)?;
+        let value = keys.try_fold(section, |table, key| table.get(key))?;
+        let is_plain = !value.is_array() && !value.is_table();
+        is_plain.then(|| value.to_string())
     }
 }
 

@@ -126,7 +126,7 @@ fn unknown(written: &str) -> String {
     let hint = meant
         .map(|path| format!("; did you mean {path}?"))
         .unwrap_or_default();
-    let mut where_to_look = "Memo there";
+    let mut where_to_look = "Known there";
     let mut known = paths()
         .filter(|path| of(path) == section)
         .collect::<Vec<_>>();
