@@ -27,6 +27,11 @@ const OUTSIDE_PART: f64 = 30.0 / 47.0;
 /// Estimates so many widths of a peak away from the air are no estimates of it.
 const BEYOND_WIDTHS: f64 = 3.0;
 
+/// With some flagged estimates, but fewer than these, outliers may be missing by chance.
+const LEAST_FLAGGED: f64 = 19.5;
+/// Estimates that a standard error needs.
+const LEAST_ESTIMATES: usize = 16;
+
 /// Names, units and meanings of the results, in the order of the columns.
 pub(super) fn results() -> impl Iterator<Item = (&'static str, &'static str, &'static str)> {
     let of_line = |line: &'static str| {
@@ -155,6 +160,19 @@ impl<'p> Collected<'p> {
         ]
     }
 
+    /// Whether standard errors over the map or a part of it are an order of magnitude only: outliers
+    /// are likely to be missing by chance, or there are too few estimates.
+    fn has_rough_errors(&self, map: &VelocityEstimates) -> bool {
+        let scans = map.scans.len();
+        let flagged = map.flagged.sum() * scans as f64;
+        let few_outliers = flagged > 0.5 && flagged < LEAST_FLAGGED;
+        let has_few_estimates = |part: Part| {
+            let estimates = self.cells(part).len() * scans;
+            (1..LEAST_ESTIMATES).contains(&estimates)
+        };
+        few_outliers || [ALL, INSIDE, OUTSIDE].into_iter().any(has_few_estimates)
+    }
+
     fn row(&self, map: &VelocityEstimates, scanner: &Scanner<'_>) -> Result<Vec<f64>, Error> {
         let plan = self.plan;
         let scene = self.plan.scene();
@@ -179,6 +197,7 @@ impl<'p> Collected<'p> {
             out.extend(self.averages(map, part));
         }
         out.extend(flagged_fraction(map));
+        out.push(f64::from(u8::from(self.has_rough_errors(map))));
         let truths_m_s = self.apart.iter().map(|cell| map.v_gate_m_s[*cell]).cycle();
         let known = self
             .velocity_m_s

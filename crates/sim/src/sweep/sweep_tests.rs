@@ -350,6 +350,24 @@ fn results_are_those_of_the_map_of_the_case() {
 }
 
 #[test]
+fn standard_errors_are_rough_with_few_outliers_or_few_estimates() {
+    let energies = "pulse.energy_j=2e-6,4e-4,8e-4,1e-3,1.5e-3,2e-3";
+    let (_, _, table) = ran(SMALL, &vary(&[energies]));
+    // Lines, gates and realisations of the scene.
+    let estimates = 165.0;
+    let mut rough_cases = 0;
+    for row in 0..table.rows.len() {
+        let number = |name: &str| table.number(row, table.column(name).unwrap());
+        let flagged = (number("flagged_fraction") * estimates).round();
+        let is_rough = flagged > 0.0 && flagged < 20.0;
+        rough_cases += usize::from(is_rough);
+        let column = number("standard_errors_rough");
+        assert_eq!(column, f64::from(u8::from(is_rough)), "{flagged} flagged");
+    }
+    assert!((1..6).contains(&rough_cases), "{rough_cases} of 6");
+}
+
+#[test]
 fn seeds_are_shared_unless_each_case_is_to_have_its_own() {
     let same = sweep("seed = 7\n", &vary(&["pulse.energy_j=50e-6,150e-6"])).unwrap();
     assert!(same.cases.iter().all(|case| case.scene.content.seed == 7));
