@@ -16,7 +16,6 @@ use wakescope_estimate::{
     polar_points,
     spectrum::unweighted_lags,
 };
-use wakescope_sim::plan::estimators;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;
 use wakescope_sim::run;
@@ -48,7 +47,7 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
     let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Signal).unwrap();
     let scene = plan.scene();
     let setup = ScanSetup {
-        sampling: estimators::sampling(scene).unwrap(),
+        sampling: scene.sampling().unwrap(),
         kind: SignalKind::Real,
         noise: Noise::Band { floor: 0.0 },
         pulse: PulseShape::gaussian(plan.instrument.pulse.sigma_s()).unwrap(),
@@ -72,7 +71,7 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
 /// Accumulated map of the likelihood with regions of 2 m, and the fit to it without prior knowledge.
 fn map_fit(taken: &Taken, options: &MapFitOptions) -> MapFit {
     let (sampling, kind) = (taken.setup.sampling, SignalKind::Real);
-    let gates = estimators::gates(taken.plan.scene()).unwrap();
+    let gates = taken.plan.scene().gates().unwrap();
     let pulse = &taken.plan.instrument.pulse;
     let window = WindowModel::gaussian_pulse(&sampling, 64, pulse.sigma_s(), Noise::White).unwrap();
     let tapers = likelihood_tapers(&window, taken.snr).unwrap();

@@ -101,8 +101,10 @@ impl Declarations {
                 }
                 "kinds" => {
                     let tag = tokens.get(i + 3).map(text_of).unwrap_or_default();
-                    let body = group(tokens.get(i + 4)).unwrap_or_default();
-                    self.kinds.insert(name, (tag, kinds(&body)));
+                    // the body may follow `with` and the name of a trait
+                    let body = tokens[i + 4..].iter().find_map(|token| group(Some(token)));
+                    self.kinds
+                        .insert(name, (tag, kinds(&body.unwrap_or_default())));
                 }
                 _ => {}
             }

@@ -2,7 +2,6 @@
 
 use super::context::*;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
-use wakescope_sim::plan::estimators;
 
 const RADII_M: [f64; 3] = [1.0, 2.0, 4.0];
 /// Where the chapter gives the levels.
@@ -27,10 +26,10 @@ impl Accumulation {
     fn new(plan: &Plan) -> Result<Self, Failure> {
         let scene = plan.scene();
         let elevation_rad = &plan.geometry.elevation_rad;
-        let gates = estimators::gates(scene)?;
-        let sampling = estimators::sampling(scene)?;
+        let gates = scene.gates()?;
+        let sampling = scene.sampling()?;
         let samples = scene.samples_per_record();
-        let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+        let window = scene.weighting().weights(scene.estimator.window_samples)?;
         Ok(Self {
             geometry: ScanGeometry::new(&sampling, &gates, elevation_rad, samples)?,
             // n_eff as the speckle has it: independent of the noise within a few per cent.

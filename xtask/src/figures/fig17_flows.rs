@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use wakescope_estimate::retrieval::VortexResult;
 use wakescope_sim::retrieve::{Method, RetrievalRow, name};
-use wakescope_sim::scene::{Method as Estimator, Retrieval, VortexPair, Weighting};
+use wakescope_sim::scene::{FirstMoment, Method as Estimator, Retrieval, VortexPair, Weighting};
 
 /// Age of the simulated wake, of which the pair has none, and the claim on the flow.
 type Aged = (Option<f64>, &'static str);
@@ -127,7 +127,7 @@ fn of_flow(context: &Context, (tau, claim): Aged, wake: &FinishedWake) -> Result
     for row in retrieved(&scene, retrieval, &sight.folder)? {
         rows.push((row.method.name(), row));
     }
-    scene.estimator.method = Estimator::FirstMoment { moment_reach: 3.5 };
+    scene.estimator.method = Estimator::FirstMoment(FirstMoment::default());
     scene.estimator.weighting = Weighting::Rectangular;
     let of_means = Retrieval {
         methods: vec![Method::Rv],

@@ -9,8 +9,8 @@ use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::plan::wind;
 use wakescope_sim::scene::{
-    Flow, Method, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion, Turbulence,
-    VortexMotion, VortexPair, Weighting,
+    Autoregressive, Flow, Method, Outside, PeriodogramAccumulation, RefractiveTurbulence,
+    SimulatedFlow, SimulatedMotion, Turbulence, VortexMotion, VortexPair, Weighting,
 };
 use wakescope_sim::sweep;
 
@@ -50,8 +50,8 @@ pub(super) const METHODS: [&str; 3] = ["PA", "PA, Gaussian", "CA"];
 /// The scene with one of the [`METHODS`].
 pub(super) fn with_method(mut scene: Scene, method: &str) -> Scene {
     scene.estimator.method = match method {
-        "CA" => Method::Autoregressive { order: 16 },
-        _ => Method::PeriodogramAccumulation {},
+        "CA" => Method::Autoregressive(Autoregressive::default()),
+        _ => Method::PeriodogramAccumulation(PeriodogramAccumulation {}),
     };
     scene.estimator.weighting = if method == METHODS[1] {
         Weighting::Gaussian

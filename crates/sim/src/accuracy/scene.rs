@@ -20,7 +20,7 @@ use crate::measure::profile::LineOptics;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Target};
 use crate::progress::{Observer, Stage};
-use crate::scene::{Method, Pattern, Scene, SceneFile, ScreenSampling};
+use crate::scene::{Pattern, Scene, SceneFile, ScreenSampling};
 use crate::sweep::Common;
 use std::time::Instant;
 use wakescope_estimate::Measured;
@@ -237,7 +237,7 @@ impl<'a> Study<'a> {
             let window = scene.estimator.window_samples;
             let step = value(scene, WINDOW_STEP);
             settings.push((WINDOW_STEP, doubled(1.0, window as f64, step)));
-            if scene.estimator.method != (Method::PulsePair {}) {
+            if scene.estimator.method.behaviour().uses(PADDED) {
                 let finest = (FINEST_PADDING * window).next_power_of_two().min(1 << 20);
                 let given = value(scene, PADDED);
                 let mut points = doubled(window as f64, given.max(finest as f64), given);

@@ -80,14 +80,30 @@ pub(crate) fn keys_of<T: Declared>() -> Vec<Key> {
 
 /// Tables, tables of several kinds, and choices, one after the other.
 macro_rules! keys {
-    ($($(#[$doc:meta])* $what:ident $name:ident $(by $tag:literal)? { $($body:tt)* })*) => {
-        $($crate::keys::$what! { $(#[$doc])* $name $(by $tag)? { $($body)* } })*
+    ($($(#[$doc:meta])* $what:ident $name:ident $(by $tag:literal)? $(with $behaviour:ident)? { $($body:tt)* })*) => {
+        $($crate::keys::$what! { $(#[$doc])* $name $(by $tag)? $(with $behaviour)? { $($body)* } })*
     };
 }
 
 /// A table of keys: name, type, default and, after each `=>`, what the value must be. A key `as omitted` is not written
 /// where it has its default.
 macro_rules! table {
+    ($(#[$doc:meta])* $name:ident {}) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, PartialEq, Default)]
+        pub struct $name {}
+        impl $crate::keys::Declared for $name {
+            fn kind() -> $crate::keys::Kind {
+                $crate::keys::Kind::Table(Vec::new())
+            }
+            fn from_value(value: &toml::Value) -> Option<Self> {
+                value.as_table().map(|_| Self {})
+            }
+            fn to_value(&self) -> Option<toml::Value> {
+                Some(toml::Value::Table(toml::Table::new()))
+            }
+        }
+    };
     ($(#[$doc:meta])* $name:ident {
         $($(#[$fdoc:meta])* $field:ident: $ty:ty $(as $omitted:ident)? = $default:expr $(=> $limit:expr)*,)*
     }) => {
@@ -118,8 +134,9 @@ macro_rules! table {
 }
 
 /// A table whose keys depend on the one named after `by`: each kind is a table of its own, or lists its keys, with or without defaults.
+/// `with` names a trait of all kinds, which are then tables of their own; `behaviour` returns the kind as that trait.
 macro_rules! kinds {
-    ($(#[$doc:meta])* $name:ident by $tag:literal {
+    ($(#[$doc:meta])* $name:ident by $tag:literal $(with $behaviour:ident)? {
         $($(#[$vdoc:meta])* $word:literal => $variant:ident $(($inner:ty))? $({
             $($(#[$fdoc:meta])* $field:ident: $ty:ty $(= $default:expr)? $(=> $limit:expr)*),* $(,)?
         })?,)*
@@ -135,6 +152,7 @@ macro_rules! kinds {
                 match self { $(Self::$variant { .. } => $word,)* }
             }
         }
+        $crate::keys::behaviour!(($($behaviour)?) $name $($variant)*);
         impl $crate::keys::Declared for $name {
             fn kind() -> $crate::keys::Kind {
                 $crate::keys::Kind::Tagged { tag: $tag, kinds: vec![$((
@@ -171,6 +189,19 @@ macro_rules! kinds {
                         $($($crate::keys::held!(c, at, $field, $field $(, $limit)*);)*)?
                     }
                 )* }
+            }
+        }
+    };
+}
+
+/// The kind as the trait of all kinds, if they have one.
+macro_rules! behaviour {
+    (() $name:ident $($variant:ident)*) => {};
+    (($behaviour:ident) $name:ident $($variant:ident)*) => {
+        impl $name {
+            /// The chosen kind.
+            pub(crate) fn behaviour(&self) -> &dyn $behaviour {
+                match self { $(Self::$variant(kind) => kind,)* }
             }
         }
     };
@@ -263,7 +294,9 @@ macro_rules! foreign_choices {
     };
 }
 
-pub(crate) use {choice, default_of, foreign_choices, held, keys, kinds, second, table, written};
+pub(crate) use {
+    behaviour, choice, default_of, foreign_choices, held, keys, kinds, second, table, written,
+};
 
 impl Declared for f64 {
     fn kind() -> Kind {

@@ -16,8 +16,8 @@ mod vet;
 mod words;
 
 pub(crate) use declare::{
-    Declared, choice, default_of, foreign_choices, from_table, held, keys, keys_of, kinds,
-    read_key, second, table, to_table, write_key, written,
+    Declared, behaviour, choice, default_of, foreign_choices, from_table, held, keys, keys_of,
+    kinds, read_key, second, table, to_table, write_key, written,
 };
 pub use document::{Content, Document};
 pub(crate) use key::{Key, Kind, join};

@@ -7,7 +7,6 @@ use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints};
 use crate::measure::ray_information::range_filter;
 use crate::measure::region::places;
 use crate::measure::scan::Scanner;
-use crate::plan::estimators;
 use crate::plan::line_wind::{radial_velocity_m_s, weighted_at_gates_m_s};
 use crate::plan::{Plan, Stage};
 use crate::progress::Observer;
@@ -160,7 +159,7 @@ impl<'p, S: Sample> Mapper<'p, S> {
         map.v_mean_m_s = &map.v_pulse_m_s + &map.bias_m_s;
         map.std_m_s = statistics.mapv(|s| s.std_m_s);
         map.rms_m_s = statistics.mapv(|s| s.rms_m_s);
-        let (low_m_s, high_m_s) = estimators::sampling(plan.scene())?.velocity_limits_m_s();
+        let (low_m_s, high_m_s) = plan.scene().sampling()?.velocity_limits_m_s();
         let half_band_m_s = 0.5 * (high_m_s - low_m_s);
         map.law = ErrorLaw::new(&map.scans, shared_cells(plan)?, half_band_m_s);
         let unknown = || Array2::from_elem(map.count.dim(), f64::NAN);

@@ -39,7 +39,7 @@ pub(crate) type WindowSums<'a, S> = ScanSums<'a, S, dyn Statistic<S>>;
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn places_of(plan: &Plan, record_elevation_rad: &[f64]) -> Result<ScanGeometry, Error> {
     let (scene, samples) = (plan.scene(), plan.geometry.samples);
-    let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
+    let (sampling, gates) = (scene.sampling()?, scene.gates()?);
     Ok(ScanGeometry::new(
         &sampling,
         &gates,
@@ -78,10 +78,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         places: ScanGeometry,
         held: Option<Range<usize>>,
     ) -> Result<WindowSums<'_, S>, Error> {
-        let (statistic, gates) = (
-            &*self.tools.statistic,
-            estimators::gates(self.plan.scene())?,
-        );
+        let (statistic, gates) = (&*self.tools.statistic, self.plan.scene().gates()?);
         Ok(match held {
             None => ScanSums::new(statistic, &gates, places, self.plan.geometry.samples)?,
             Some(held) => ScanSums::of_gates(statistic, &gates, places, held)?,

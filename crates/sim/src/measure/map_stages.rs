@@ -4,7 +4,7 @@ use crate::Error;
 use crate::measure::region;
 use crate::measure::scan_stages::{scan_bytes, wind_bytes};
 use crate::plan::{Plan, PlannedStage, Stage};
-use crate::scene::{Estimator, Method, RegionRadius};
+use crate::scene::{Estimator, RegionRadius};
 use wakescope_estimate::map::PolarPoint;
 
 /// Fields of a map of estimates.
@@ -136,16 +136,13 @@ pub(crate) fn bound_bytes(plan: &Plan) -> f64 {
 fn planning_bytes(plan: &Plan) -> (f64, f64) {
     let e = &plan.scene().estimator;
     let matrix_bytes = (e.window_samples as f64).powi(2) * 8.0;
-    let (kept_matrices, matrices) = match e.method {
-        Method::Likelihood { .. } => (1.0, 8.0),
-        _ => (0.0, 0.0),
-    };
+    let covariances = e.method.behaviour().covariances();
     let bound_bytes = match e.radius {
         RegionRadius::Target { .. } => bound_bytes(plan),
         _ => 0.0,
     };
-    let kept_bytes = kept_matrices * matrix_bytes + frequencies(plan) * 32.0;
-    let making_bytes = bound_bytes.max(matrices * matrix_bytes);
+    let kept_bytes = covariances * matrix_bytes + frequencies(plan) * 32.0;
+    let making_bytes = bound_bytes.max(8.0 * covariances * matrix_bytes);
     (kept_bytes, kept_bytes + making_bytes)
 }
 
@@ -158,22 +155,15 @@ fn estimates_s(plan: &Plan) -> f64 {
     let numbers = numbers_per_window(plan);
     let numbers_s = numbers * 6e-9;
     let spectrum_s = frequencies(plan) * (6e-9 + numbers.min(window) * 6e-11);
-    // Of a window, and of the covariances that are decomposed.
-    let (window_s, covariances) = match e.method {
-        Method::Likelihood { .. } => {
-            // As many tapers as a window has independent parts, about.
-            let parts = window / (scene.detector.sampling_hz * scene.pulse_sigma_s()).max(1.0);
-            (numbers_s * (2.0 + 0.5 * parts), 1.0)
-        }
-        _ => (numbers_s, 0.0),
-    };
+    let method = e.method.behaviour();
+    let window_s = numbers_s * method.window_cost(scene);
     let point_s = lines_per_region(plan) * numbers * 5e-9 + spectrum_s;
     let points_s = n.cells * n.realisations * point_s;
     let bounded = match e.radius {
         RegionRadius::Target { .. } => bound_samples(plan).powi(3),
         _ => 0.0,
     };
-    let planned_s = 4e-8 * (covariances * window.powi(3) + bounded);
+    let planned_s = 4e-8 * (method.covariances() * window.powi(3) + bounded);
     let pictures_s = 0.25 * f64::from(u8::from(scene.outputs.svg) + u8::from(scene.outputs.png));
     n.realisations * n.records * windows_per_record(plan) * window_s
         + points_s

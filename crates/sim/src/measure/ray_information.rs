@@ -15,7 +15,7 @@ const SNR: std::ops::RangeInclusive<f64> = 1e-8..=1e6;
 /// Weight of the air about the range of a gate: of the pulse and of the window.
 pub(crate) fn range_filter(plan: &Plan) -> Result<RangeFilter, Error> {
     let scene = plan.scene();
-    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let window = scene.weighting().weights(scene.estimator.window_samples)?;
     let thickness_m = plan.geometry.layer_thickness_m;
     Ok(RangeFilter::gate(
         &plan.instrument.pulse,
@@ -78,9 +78,7 @@ impl<'a> RayInformation<'a> {
                     .apply_into(self.layer_m[0], &self.layer_snr, &[at_m], &mut snr);
             seen.map_or(f64::NAN, |()| snr[0].clamp(0.0, *SNR.end()))
         };
-        Ok(self
-            .model
-            .information(&estimators::gates(scene)?, count, snr)?)
+        Ok(self.model.information(&scene.gates()?, count, snr)?)
     }
 
     /// The same where all samples have one signal-to-noise ratio.
@@ -88,7 +86,7 @@ impl<'a> RayInformation<'a> {
         let snr = snr.clamp(*SNR.start(), *SNR.end());
         Ok(self
             .model
-            .information(&estimators::gates(self.plan.scene())?, count, |_| snr)?)
+            .information(&self.plan.scene().gates()?, count, |_| snr)?)
     }
 }
 

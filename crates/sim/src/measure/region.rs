@@ -2,11 +2,11 @@
 //!
 //! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
 
+use crate::Error;
 use crate::interpolation::interpolate;
 use crate::measure::ray_information::RayInformation;
 use crate::plan::geometry::Geometry;
 use crate::scene::{RegionRadius, Scene};
-use crate::{Error, plan::estimators};
 use wakescope_estimate::{Radius, map::ScanGeometry};
 
 /// Where the windows of a scan are: in one plane if it is a plain RHI, else on a sphere.
@@ -14,11 +14,7 @@ use wakescope_estimate::{Radius, map::ScanGeometry};
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn places(scene: &Scene, g: &Geometry) -> Result<ScanGeometry, Error> {
-    let (sampling, gates, scan) = (
-        estimators::sampling(scene)?,
-        estimators::gates(scene)?,
-        &g.schedule,
-    );
+    let (sampling, gates, scan) = (scene.sampling()?, scene.gates()?, &g.schedule);
     if scan.is_plane() {
         let pulses = scan.lines.first().map_or(1, |line| line.pulses);
         return Ok(ScanGeometry::regular(

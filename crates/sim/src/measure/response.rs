@@ -6,7 +6,7 @@ use crate::Error;
 use crate::measure::ray_information::RayInformation;
 use crate::measure::region::{places, region_radius};
 use crate::measure::scan::{Scanner, median_snr};
-use crate::plan::estimators::{Response, noise_kind, response, sampling, signal_kind};
+use crate::plan::estimators::{Response, response};
 use crate::plan::{Plan, Target};
 use crate::progress::Observer;
 use crate::scene::{Scene, SceneFile};
@@ -43,7 +43,7 @@ impl SceneResponse {
     /// What the regions refuse; a checked scene gives none.
     pub(crate) fn new(plan: &Plan, layer_snr: Vec<(f64, f64)>) -> Result<Option<Self>, Error> {
         let (scene, pulse) = (plan.scene(), &plan.instrument.pulse);
-        let Some(noise) = noise_kind(scene).filter(|_| scene.pulse.is_gaussian()) else {
+        let Some(noise) = scene.noise_spectrum().filter(|_| scene.pulse.is_gaussian()) else {
             return Ok(None);
         };
         let of_rays = RayInformation::new(plan, &layer_snr)?;
@@ -77,7 +77,7 @@ impl SceneResponse {
     pub(crate) fn shown(&self, range_m: f64) -> Option<EstimatorResponse<'_>> {
         let (correlogram, estimator) = self.response.as_ref()?;
         let noise = (self.noise, self.snr_at(range_m));
-        let sampling = sampling(&self.scene).ok()?;
+        let sampling = self.scene.sampling().ok()?;
         let of_lines = EstimatorResponse::new(
             correlogram,
             &**estimator,
@@ -120,8 +120,8 @@ impl SceneResponse {
     ) -> Result<ScanSetup, Error> {
         let scene = &self.scene;
         Ok(ScanSetup {
-            sampling: sampling(scene)?,
-            kind: signal_kind(scene),
+            sampling: scene.sampling()?,
+            kind: scene.signal_kind(),
             noise: self.noise,
             pulse: self.pulse.clone(),
             wake,

@@ -5,7 +5,6 @@
 
 use crate::plan::Plan;
 use crate::plan::estimators::grid_step_and_bias_m_s;
-use crate::scene::{Method, Weighting};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 
 /// Least shift of velocities by the pulse that is reported, m/s.
@@ -17,7 +16,7 @@ const SHIFT_M_S: f64 = 0.01;
 /// What the estimators refuse; a checked scene gives none.
 pub(super) fn of_scene(plan: &Plan) -> Result<Vec<String>, Error> {
     let scene = plan.scene();
-    let (e, method) = (&scene.estimator, scene.estimator.method);
+    let e = &scene.estimator;
     let mut out = Vec::from_iter(of_fast_air(plan));
     out.extend(of_shifted_pulse(plan));
     if e.padded_samples < 4 * e.window_samples {
@@ -27,14 +26,7 @@ pub(super) fn of_scene(plan: &Plan) -> Result<Vec<String>, Error> {
              to {off_m_s:.3} m/s off"
         ));
     }
-    let is_model = matches!(
-        method,
-        Method::Autoregressive { .. } | Method::FirstMoment { .. }
-    );
-    if is_model && e.weighting != Weighting::Rectangular {
-        let meant = "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\"";
-        out.push(meant.into());
-    }
+    out.extend(e.method.behaviour().warning(e));
     if scene.outputs.signals && !scene.outputs.netcdf {
         out.push(
             "outputs.netcdf = false: no file holds the signals that outputs.signals requests"

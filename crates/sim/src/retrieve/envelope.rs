@@ -7,7 +7,6 @@ use crate::Error;
 use crate::io::Table;
 use crate::measure::recorded::{Spectra, upward};
 use crate::plan::Plan;
-use crate::plan::estimators;
 use ndarray::Array3;
 use std::ops::Range;
 use wakescope_estimate::Measured;
@@ -41,7 +40,7 @@ pub fn envelopes(
         Weighting::Gaussian {
             relative_half_width,
         },
-    ) = (scene.pulse.is_gaussian(), estimators::weighting(scene))
+    ) = (scene.pulse.is_gaussian(), scene.weighting())
     else {
         return Err(refuse(
             "--method envelope knows Gaussian pulses and windows alone: estimator.weighting = \"gaussian\"",

@@ -9,7 +9,6 @@ use super::table::{RetrievedScan, refused};
 use crate::detection::strided;
 use crate::io::scans::ReadScan;
 use crate::measure::response::SceneResponse;
-use crate::plan::estimators;
 use crate::plan::instrument::Instrument;
 use crate::progress::Observer;
 use crate::scene::{Flow, RetrievalMethod as Method, Scene, SceneFile};
@@ -71,7 +70,7 @@ fn of_std(std_m: f64) -> Gate {
 
 /// Pulse and window of a scene.
 fn of_scene(scene: &Scene) -> Result<Gate, Error> {
-    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let window = scene.weighting().weights(scene.estimator.window_samples)?;
     let sigma_s = Instrument::new(scene)?.pulse.sigma_s();
     let period_s = 1.0 / scene.detector.sampling_hz;
     Ok(Gate::Kernel(RangeKernel::gaussian_gate(

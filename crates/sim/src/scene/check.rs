@@ -7,7 +7,7 @@ use super::estimator::check_estimator;
 use super::flow::check_flow;
 use super::retrieval::check_retrieval;
 use super::{
-    DetectorSignal, EfficiencyOfPulse, Flow, Method, Outside, Pattern, PulseShape, Scan, Scene,
+    DetectorSignal, EfficiencyOfPulse, Flow, Outside, Pattern, PulseShape, Scan, Scene,
     SnrReference, SpectrumKind, Turbulence,
 };
 use crate::keys::{Checker, Declared as _, Problem, side};
@@ -246,10 +246,10 @@ impl Scene {
     /// The spectrum has a frequency in the band.
     fn check_frequencies(&self, c: &mut Checker<'_>) {
         let (d, e) = (&self.detector, &self.estimator);
-        let (key, value, points_of_one) = match e.method {
-            Method::PulsePair {} => ("estimator.window_samples", e.window_samples, 4.0),
-            _ => ("estimator.padded_samples", e.padded_samples, 1.0),
-        };
+        let method = e.method.behaviour();
+        let (key, factor) = method.frequencies_key();
+        let value = method.frequencies(e) / factor;
+        let points_of_one = factor as f64;
         let step_hz = d.sampling_hz / (value as f64 * points_of_one);
         let place =
             |edge: f64| (d.intermediate_frequency_hz + edge * 0.5 * d.bandwidth_hz) / step_hz;

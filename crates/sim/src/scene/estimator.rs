@@ -1,7 +1,6 @@
-//! From signals to velocities: the estimator of a scene, its method with its own keys, and what all methods share, with the limits
-//! between them.
+//! From signals to velocities: the keys that all methods of estimation share, and the limits between them.
 
-use super::Scene;
+use super::{Method, PeriodogramAccumulation, Scene};
 use crate::interpolation::interpolate;
 use crate::keys::{Checker, Is, Number, keys};
 use wakescope_estimate::Refinement;
@@ -30,35 +29,9 @@ keys! {
             "0 for no test, or from 1e-12 to 0.5: the probability that noise passes at a gate, for example 0.01",
         ),
         /// Which estimator, with the keys that are its own.
-        method: Method = Method::PeriodogramAccumulation {},
+        method: Method = Method::PeriodogramAccumulation(PeriodogramAccumulation {}),
         /// How the radius depends on range.
         radius: RegionRadius = RegionRadius::Fixed {},
-    }
-
-    /// Which estimator makes the map, with the keys that only it has.
-    #[derive(Copy)]
-    kinds Method by "kind" {
-        /// Mean periodogram of the pulses of one line at one range, no region.
-        "periodogram" => Periodogram {},
-        /// PA: mean periodogram of all windows of the region (Table 3).
-        "periodogram_accumulation" => PeriodogramAccumulation {},
-        /// CA: peak of the autoregressive spectrum of the mean correlogram (Table 3).
-        "autoregressive" => Autoregressive {
-            /// Order of the model.
-            order: usize = 16 => 1..=65_535,
-        },
-        /// Phase of the first lag.
-        "pulse_pair" => PulsePair {},
-        /// Mean of the main peak of the spectrum.
-        "first_moment" => FirstMoment {
-            /// Half width of the part of the spectrum that is averaged, in its standard deviations.
-            moment_reach: f64 = 3.5 => 0.1..=100.0,
-        },
-        /// Maximum likelihood of the velocity for the known pulse, by tapers.
-        "likelihood" => Likelihood {
-            /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
-            likelihood_snr_db: Option<f64> => -100.0..=100.0,
-        },
     }
 
     /// How the radius of the region depends on range.
@@ -96,13 +69,35 @@ keys! {
 }
 
 impl Estimator {
+    /// The key of the samples of a window.
+    pub(crate) const WINDOW_SAMPLES: &str = "estimator.window_samples";
+
+    /// The key of the weighting of a window.
+    pub(crate) const WEIGHTING: &str = "estimator.weighting";
+
+    /// The key of the number of frequencies of the spectrum.
+    pub(crate) const PADDED_SAMPLES: &str = "estimator.padded_samples";
+
+    /// The key of the refinement of the peak.
+    pub(crate) const REFINEMENT: &str = "estimator.refinement";
+
     /// The key of the radius of all regions.
     pub(crate) const RADIUS: &str = "estimator.radius_m";
 
-    /// What says how large the regions are.
+    /// Whether the map has regions of accumulation.
+    pub(crate) fn has_regions(&self) -> bool {
+        self.method.behaviour().uses(Self::RADIUS)
+    }
+
+    /// Whether the windows have the weighting of the scene.
+    pub(crate) fn is_weighted(&self) -> bool {
+        self.method.behaviour().uses(Self::WEIGHTING)
+    }
+
+    /// Size of the regions, as text.
     pub(crate) fn regions(&self) -> String {
         match &self.radius {
-            _ if self.method == (Method::Periodogram {}) => "no region".to_owned(),
+            _ if !self.has_regions() => "no region".to_owned(),
             RegionRadius::Fixed {} => format!("regions of {} m", self.radius_m),
             RegionRadius::OfRange { .. } => "regions whose radius depends on range".to_owned(),
             RegionRadius::Target {
@@ -114,10 +109,10 @@ impl Estimator {
         }
     }
 
-    /// Radius of the regions at a range, m; the largest that is allowed where it is sought.
+    /// Radius of the regions at a range, m; the largest that is allowed for a standard deviation.
     pub(crate) fn largest_radius_m(&self, range_m: f64) -> f64 {
         match &self.radius {
-            _ if self.method == (Method::Periodogram {}) => 0.0,
+            _ if !self.has_regions() => 0.0,
             RegionRadius::OfRange {
                 range_m: at_m,
                 radius_m,
@@ -127,33 +122,11 @@ impl Estimator {
         }
     }
 
-    /// Lags that are kept of a window where they are but those that a model of this order needs: of windows without weighting.
+    /// Number of lags of a window that are computed, if the method does not need all of an
+    /// unweighted window.
     pub(crate) fn few_lags(&self) -> Option<usize> {
-        self.method
-            .order()
-            .filter(|_| self.weighting == Weighting::Rectangular)
-            .map(|order| order + 1)
-    }
-}
-
-impl Method {
-    /// Whether tapers of its own take the place of the weighting of the windows.
-    pub(crate) fn has_own_tapers(&self) -> bool {
-        matches!(self, Self::Likelihood { .. })
-    }
-
-    /// The order of the model that the method fits, if it fits one.
-    pub fn order(&self) -> Option<usize> {
-        match self {
-            Self::Autoregressive { order } => Some(*order),
-            _ => None,
-        }
-    }
-
-    /// Signal-to-noise ratio for which a likelihood is planned, dB, if the scene states one.
-    pub fn likelihood_snr_db(&self) -> Option<f64> {
-        match self {
-            Self::Likelihood { likelihood_snr_db } => *likelihood_snr_db,
+        match self.weighting {
+            Weighting::Rectangular => self.method.behaviour().lags(),
             _ => None,
         }
     }
@@ -162,37 +135,24 @@ impl Method {
 /// Every limit of the estimator's keys, and those between them.
 pub(super) fn check_estimator(scene: &Scene, c: &mut Checker<'_>) {
     let e = &scene.estimator;
-    let mut beside_window = |key, value, word| {
-        c.compare(
-            [key, "estimator.window_samples"],
-            [value, e.window_samples],
-            word,
-        )
-    };
-    beside_window("estimator.padded_samples", e.padded_samples, "at least");
-    if let Some(order) = e.method.order() {
-        beside_window("estimator.method.order", order, "below");
-    }
+    c.compare(
+        [Estimator::PADDED_SAMPLES, Estimator::WINDOW_SAMPLES],
+        [e.padded_samples, e.window_samples],
+        "at least",
+    );
     if let RegionRadius::OfRange { range_m, radius_m } = &e.radius {
         let fits =
             radius_m.len() == range_m.len() && radius_m.iter().all(|r| (0.0..=1e5).contains(r));
         let allowed = "one number from 0 to 1e5 m for each of estimator.radius.range_m";
         c.require(fits, "estimator.radius.radius_m", radius_m, allowed);
     }
-    let without_region = e.method == (Method::Periodogram {});
-    let allowed = "another one with estimator.radius: \"periodogram\" has no region";
-    let is_fixed = e.radius == (RegionRadius::Fixed {});
-    c.require(
-        is_fixed || !without_region,
-        "estimator.method.kind",
-        "periodogram",
-        allowed,
-    );
+    e.method.behaviour().check(e, c);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Autoregressive, FirstMoment, Likelihood};
 
     fn keys(change: impl FnOnce(&mut Estimator)) -> Vec<String> {
         let mut scene = Scene::default();
@@ -203,15 +163,15 @@ mod tests {
     #[test]
     fn knobs_of_the_estimators_are_held_to_their_limits() {
         let own = |method| keys(|e| e.method = method);
-        let order = Method::Autoregressive { order: 64 };
+        let order = Method::Autoregressive(Autoregressive { order: 64 });
         assert_eq!(own(order), ["estimator.method.order"]);
-        let reach = Method::FirstMoment {
+        let reach = Method::FirstMoment(FirstMoment {
             moment_reach: f64::NAN,
-        };
+        });
         assert_eq!(own(reach), ["estimator.method.moment_reach"]);
-        let strong = Method::Likelihood {
+        let strong = Method::Likelihood(Likelihood {
             likelihood_snr_db: Some(200.0),
-        };
+        });
         assert_eq!(own(strong), ["estimator.method.likelihood_snr_db"]);
         let with = |method, change: fn(&mut Estimator)| {
             keys(|e| {
@@ -219,9 +179,9 @@ mod tests {
                 change(e);
             })
         };
-        let model = Method::Autoregressive { order: 16 };
+        let model = || Method::Autoregressive(Autoregressive { order: 16 });
         assert_eq!(
-            with(model, |e| e.false_alarm = 1.0),
+            with(model(), |e| e.false_alarm = 1.0),
             ["estimator.false_alarm"]
         );
         let table = |e: &mut Estimator| {
@@ -230,6 +190,6 @@ mod tests {
                 radius_m: vec![1.0, 2.0],
             };
         };
-        assert_eq!(with(model, table), ["estimator.radius.range_m"]);
+        assert_eq!(with(model(), table), ["estimator.radius.range_m"]);
     }
 }

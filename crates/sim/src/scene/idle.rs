@@ -3,7 +3,7 @@
 //! They are refused, so that nobody turns a knob that turns nothing. Keys that stand in the file of `wakescope init` may stay
 //! there with their default.
 
-use super::{Estimator, FrontEnd, HeadMotion, Method, NoiseModel, Pattern, RefractiveTurbulence};
+use super::{Estimator, FrontEnd, HeadMotion, NoiseModel, Pattern, RefractiveTurbulence};
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
 use super::{RegionRadius, SignalsOf};
 use crate::keys::{Text, lines_with_keys, to_table, value_at};
@@ -19,12 +19,9 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
             found.extend(keys.iter().map(|key| (*key, purpose.clone())));
         }
     };
-    let without_peak = matches!(method, Method::PulsePair {} | Method::FirstMoment { .. });
-    unused(
-        without_peak,
-        &["estimator.refinement"],
-        format!("{kind} refines no peak"),
-    );
+    for &(key, reason) in method.behaviour().unused_keys() {
+        unused(true, &[key], format!("{kind} {reason}"));
+    }
     let none = !scene.outputs.signals && scene.outputs.signals_of == SignalsOf::All;
     unused(
         none,
@@ -38,24 +35,8 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
         &["estimator.false_alarm"],
         "detector.noise = \"none\" leaves nothing to test".into(),
     );
-    let without_spectrum = *method == (Method::PulsePair {});
-    unused(
-        without_spectrum,
-        &["estimator.padded_samples"],
-        format!("{kind} has no spectrum"),
-    );
-    unused(
-        method.has_own_tapers(),
-        &["estimator.weighting"],
-        format!("{kind} has tapers of its own"),
-    );
-    let without_region = *method == (Method::Periodogram {});
-    unused(
-        without_region,
-        &[Estimator::RADIUS],
-        format!("{kind} has no region"),
-    );
-    let own_radius = !without_region && scene.estimator.radius != RegionRadius::Fixed {};
+    let own_radius =
+        scene.estimator.has_regions() && scene.estimator.radius != RegionRadius::Fixed {};
     unused(
         own_radius,
         &[Estimator::RADIUS],

@@ -58,8 +58,7 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let key = "retrieval.methods";
     let estimator = &scene.estimator;
     let lacks = |method| !r.methods.contains(&method);
-    let has_edges =
-        estimator.weighting == Weighting::Gaussian && !estimator.method.has_own_tapers();
+    let has_edges = estimator.weighting == Weighting::Gaussian && estimator.is_weighted();
     let allowed = "another method unless estimator.weighting = \"gaussian\" and the windows are weighted with it, as all are but those of the \
                    likelihoods";
     c.require(

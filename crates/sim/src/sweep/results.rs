@@ -12,7 +12,6 @@ use crate::measure::profile::EfficiencyMemo;
 use crate::measure::ray_information::range_filter;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
-use crate::plan::estimators;
 use crate::plan::wind::vortex_pair;
 use crate::progress::Observer;
 use crate::run::ScanMiddle;
@@ -224,7 +223,7 @@ impl<'p> Collected<'p> {
 fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
     let scene = plan.scene();
     let pulse = &plan.instrument.pulse;
-    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let window = scene.weighting().weights(scene.estimator.window_samples)?;
     let moment = |power: i32| {
         window
             .iter()

@@ -130,9 +130,7 @@ fn resolution_is_the_stored_one() {
             _ => Weighting::Gaussian,
         };
         let pulse = scene.pulse.simulated().unwrap();
-        let window = crate::plan::estimators::weighting(&scene)
-            .weights(number(1) as usize)
-            .unwrap();
+        let window = scene.weighting().weights(number(1) as usize).unwrap();
         let filter = RangeFilter::gate(&pulse, &window, number(2), 0.3).unwrap();
         // The stored width is interpolated on a grid.
         for (found, expected, within) in [

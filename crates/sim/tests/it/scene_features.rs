@@ -5,7 +5,7 @@ use num_complex::Complex;
 use std::path::Path;
 use wakescope_estimate::{Scratch, SignalKind, window::Sample};
 use wakescope_sim::measure::map::VelocityEstimates;
-use wakescope_sim::plan::estimators::{self, Toolkit};
+use wakescope_sim::plan::estimators::Toolkit;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;
 use wakescope_sim::run::{RunResult, run};
@@ -356,7 +356,7 @@ fn by_default_noise_passes_one_time_in_a_hundred_and_estimates_at_minus_14_db_ar
 fn shown_db<S: Sample>(plan: &Plan, velocity_m_s: f64, sinusoid: fn(f64, f64) -> S) -> [f64; 2] {
     let (scene, instrument) = (plan.scene(), &plan.instrument);
     let tools = Toolkit::<S>::new(scene, instrument, 1.0).unwrap();
-    let sampling = estimators::sampling(scene).unwrap();
+    let sampling = scene.sampling().unwrap();
     let (d, n) = (&scene.detector, scene.estimator.window_samples);
     let mut mean = vec![0.0; tools.statistic.statistic_len()];
     let mut scratch = Scratch::new();

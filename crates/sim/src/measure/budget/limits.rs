@@ -4,7 +4,6 @@ use super::digits::si;
 use crate::measure::ray_information::range_filter;
 use crate::plan::Plan;
 use crate::plan::described::sampled_velocities_m_s;
-use crate::plan::estimators;
 use crate::scene::Weighting;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use wakescope_signal::RangeFilter;
@@ -130,7 +129,7 @@ impl Limits {
         let mean_m_s = mean_frequency_sd_m_s(wavelength_m, linewidth_hz, delay_s, window_s);
         /// Places of the window between which its weights are joined by straight lines.
         const PLACES: usize = 1000;
-        let weights = estimators::weighting(scene).weights(PLACES)?;
+        let weights = scene.weighting().weights(PLACES)?;
         let at = |s: f64| weights[(((s + 0.5) * PLACES as f64) as usize).min(PLACES - 1)];
         let peak_m_s = mean_m_s * peak_variance_factor(at).sqrt();
         let spectrum_m_s = 0.5 * wavelength_m * plan.instrument.pulse.spectral_width_hz();

@@ -13,7 +13,6 @@ use crate::measure::gate_estimates::GateEstimate;
 use crate::measure::map_estimator::{MapEstimator, places_of};
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
-use crate::plan::estimators;
 use crate::progress::Observer;
 use ndarray::Array2;
 use wakescope_estimate::GateVelocity;
@@ -145,7 +144,7 @@ impl<S: Sample> Blocks<'_, S> {
         let (plan, estimator, (read, held), lines) =
             (self.plan, &self.estimator, &tile.windows, &cells.lines);
         let of_records = lines.records(read);
-        let of_samples = estimators::gates(plan.scene())?.samples(held);
+        let of_samples = plan.scene().gates()?.samples(held);
         let places = places_of(plan, &lines.record_elevation_rad(read))?;
         let mut sums = estimator
             .sums(places, Some(held.clone()))?

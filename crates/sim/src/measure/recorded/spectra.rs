@@ -7,7 +7,6 @@ use crate::Error;
 use crate::io::OutputError;
 use crate::measure::map_estimator::{MapEstimator, places_of};
 use crate::plan::Plan;
-use crate::plan::estimators;
 use ndarray::ArrayView2;
 use wakescope_estimate::map::PolarPoint;
 use wakescope_estimate::spectrum::LagSpectrum;
@@ -32,7 +31,7 @@ pub struct Spectra {
 impl Spectra {
     /// Of the lines and the densities of each scan.
     pub(super) fn of(plan: &Plan, scans: &[(&ScanLines, &[f32])]) -> Result<Self, Error> {
-        let of_gate = GateSpectra::new(plan, estimators::signal_kind(plan.scene()))?;
+        let of_gate = GateSpectra::new(plan, plan.scene().signal_kind())?;
         let lines = || scans.iter().map(|(lines, _)| lines);
         let elevation_rad = lines()
             .flat_map(|lines| lines.elevation_rad.iter().copied())
@@ -111,7 +110,7 @@ impl GateSpectra {
                 reason,
             });
         }
-        let (sampling, padded) = (estimators::sampling(scene)?, e.padded_samples);
+        let (sampling, padded) = (scene.sampling()?, e.padded_samples);
         let spectrum = LagSpectrum::new(kind, e.window_samples, padded)?;
         let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
         let of_bin = |bin: usize| {

@@ -1,0 +1,119 @@
+//! The records of a scene in the terms of the estimators: sampling, windows, noise, and the
+//! autocorrelation of the pulse.
+
+use super::{DetectorSignal, NoiseModel, Scene, Weighting};
+use crate::{Error, SPEED_OF_LIGHT_M_S};
+use num_complex::Complex;
+use std::f64::consts::TAU;
+use wakescope_estimate::bound::Noise;
+use wakescope_estimate::{self as estimate, Sampling, SignalKind};
+
+impl Scene {
+    /// Sampling of the records.
+    ///
+    /// # Errors
+    /// Fails if the estimators refuse the sampling; that of a checked scene is not refused.
+    pub fn sampling(&self) -> Result<Sampling, Error> {
+        let d = &self.detector;
+        let wavelength_m = self.laser.wavelength_m;
+        Ok(match d.signal {
+            DetectorSignal::IntermediateFrequency => {
+                let centre_hz = d.intermediate_frequency_hz;
+                let half_hz = 0.5 * d.bandwidth_hz;
+                let band_hz = (centre_hz - half_hz, centre_hz + half_hz);
+                Sampling::new(d.sampling_hz, centre_hz, wavelength_m, band_hz)?
+            }
+            DetectorSignal::Baseband => {
+                Sampling::baseband(d.sampling_hz, wavelength_m, d.bandwidth_hz)?
+            }
+        })
+    }
+
+    /// Whether the records are real or complex.
+    pub(crate) fn signal_kind(&self) -> SignalKind {
+        match self.detector.signal {
+            DetectorSignal::IntermediateFrequency => SignalKind::Real,
+            DetectorSignal::Baseband => SignalKind::Complex,
+        }
+    }
+
+    /// The windows that are accumulated.
+    ///
+    /// # Errors
+    /// Fails if the estimators refuse the windows; those of a checked scene are not refused.
+    pub fn gates(&self) -> Result<estimate::Gates, Error> {
+        let e = &self.estimator;
+        let first_sample_time_s = 2.0 * self.scan.range_min_m / SPEED_OF_LIGHT_M_S;
+        let gates =
+            estimate::Gates::new(e.window_samples, e.window_step_samples, first_sample_time_s)?;
+        Ok(gates)
+    }
+
+    /// Weighting of the windows; rectangular for a method with its own tapers, which together weight
+    /// nearly all samples equally.
+    pub fn weighting(&self) -> estimate::Weighting {
+        if !self.estimator.is_weighted() {
+            return estimate::Weighting::Rectangular;
+        }
+        match self.estimator.weighting {
+            Weighting::Gaussian => estimate::Weighting::default(),
+            Weighting::Rectangular => estimate::Weighting::Rectangular,
+            Weighting::Hann => estimate::Weighting::Hann,
+        }
+    }
+
+    /// Spectrum of the noise, if there is noise.
+    pub(crate) fn noise_spectrum(&self) -> Option<Noise> {
+        match self.detector.noise {
+            NoiseModel::White => Some(Noise::White),
+            NoiseModel::BandLimited => Some(Noise::Band { floor: 0.0 }),
+            NoiseModel::None => None,
+        }
+    }
+
+    /// Real part of the autocorrelation of the pulse at the lags of a record, its mean frequency
+    /// removed; 1 at lag 0.
+    ///
+    /// `exp(-tau^2/(4 sigma^2))` for a Gaussian.
+    pub(crate) fn pulse_correlation(&self, pulse: &wakescope_signal::Pulse) -> Vec<f64> {
+        let count = self.samples_per_record();
+        let period_s = 1.0 / self.detector.sampling_hz;
+        let mut correlation = vec![0.0; count];
+        if self.pulse.is_gaussian() {
+            for (m, value) in correlation.iter_mut().enumerate() {
+                let lag = m as f64 * period_s / pulse.sigma_s();
+                *value = (-0.25 * lag.powi(2)).exp();
+            }
+            return correlation;
+        }
+        // Fine enough for the spectrum of the pulse; the sum over a smooth pulse that ends at 0 converges fast.
+        let parts = (16.0 * pulse.spectral_width_hz() * period_s).ceil();
+        let parts = parts.max(1.0) as usize;
+        let step_s = period_s / parts as f64;
+        let (first_s, last_s) = pulse.support_s();
+        let steps = ((last_s - first_s) / step_s).ceil() as usize;
+        let turn = -TAU * pulse.mean_frequency_hz();
+        let mut envelope = Vec::with_capacity(steps + 1);
+        for i in 0..=steps {
+            let time_s = first_s + i as f64 * step_s;
+            let carrier = Complex::from_polar(1.0, turn * time_s);
+            envelope.push(pulse.envelope_per_sqrt_s(time_s) * carrier);
+        }
+        let energy = lagged_product(&envelope, 0);
+        for (m, value) in correlation.iter_mut().enumerate() {
+            if m * parts <= steps {
+                *value = lagged_product(&envelope, m * parts) / energy;
+            }
+        }
+        correlation
+    }
+}
+
+/// Real part of the sum of the products of samples `lag` apart.
+fn lagged_product(envelope: &[Complex<f64>], lag: usize) -> f64 {
+    let mut sum = 0.0;
+    for (late, early) in envelope[lag..].iter().zip(envelope) {
+        sum += (late * early.conj()).re;
+    }
+    sum
+}
