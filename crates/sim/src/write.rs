@@ -94,7 +94,7 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
             .map(|estimates| beam_winds::beam_winds(plan, estimates))
             .transpose()?
             .flatten();
-        if matches!(pattern, Pattern::Vad { .. } | Pattern::Dbs { .. }) {
+        if pattern.has_beam_winds() {
             files.table("wind", winds.as_deref(), |winds| {
                 Ok(beam_winds::table(winds))
             })?;

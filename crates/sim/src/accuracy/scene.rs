@@ -20,7 +20,7 @@ use crate::measure::profile::LineOptics;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Target};
 use crate::progress::{Observer, Stage};
-use crate::scene::{Pattern, Scene, SceneFile, ScreenSampling};
+use crate::scene::{Scene, SceneFile, ScreenSampling};
 use crate::sweep::Common;
 use std::time::Instant;
 use wakescope_estimate::Measured;
@@ -95,10 +95,7 @@ fn metrics_of(plan: &Plan, request: &Request) -> Vec<Metric> {
         metrics.push(Metric::Efficiency);
     }
     metrics.extend([Metric::Bias, Metric::Std, Metric::Rms]);
-    if matches!(
-        scene.scan.pattern,
-        Pattern::Vad { .. } | Pattern::Dbs { .. }
-    ) {
+    if scene.scan.pattern.has_beam_winds() {
         metrics.extend([Metric::U, Metric::V, Metric::W]);
     }
     // Fits need long.

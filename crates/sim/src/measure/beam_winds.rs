@@ -42,7 +42,7 @@ pub struct BeamWind {
 /// What the estimators or the wind refuse; a checked scene gives none.
 pub fn beam_winds(plan: &Plan, map: &VelocityEstimates) -> Result<Option<Vec<BeamWind>>, Error> {
     let pattern = &plan.scene().scan.pattern;
-    if !matches!(pattern, Pattern::Vad { .. } | Pattern::Dbs { .. }) {
+    if !pattern.has_beam_winds() {
         return Ok(None);
     }
     let mut out = Vec::with_capacity(plan.geometry.schedule.sweeps.len() * map.range_m.len());
@@ -104,7 +104,7 @@ pub(crate) fn mean_wind_m_s(
     velocity_m_s: &Array2<f64>,
 ) -> Result<Option<[f64; 3]>, Error> {
     let pattern = &plan.scene().scan.pattern;
-    if !matches!(pattern, Pattern::Vad { .. } | Pattern::Dbs { .. }) {
+    if !pattern.has_beam_winds() {
         return Ok(None);
     }
     let (mut sum, mut count) = ([0.0; 3], 0.0);

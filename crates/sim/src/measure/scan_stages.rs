@@ -139,10 +139,7 @@ fn signals_s(plan: &Plan) -> f64 {
 
 /// Time of the wind at one point, s of one core.
 fn wind_point_s(flow: &Flow) -> f64 {
-    match flow {
-        Flow::Simulated(_) | Flow::Fields(_) => 4e-7,
-        _ => 7e-8,
-    }
+    if flow.is_stored() { 4e-7 } else { 7e-8 }
 }
 
 /// Largest number of layers of a line that are examined one by one.
@@ -153,9 +150,7 @@ const LAYERS_EXAMINED: usize = 1_000_000;
 /// by layer.
 fn refuse_lines_outside(plan: &Plan) -> Result<(), Error> {
     let g = &plan.geometry;
-    if !matches!(plan.scene().flow, Flow::Simulated(_) | Flow::Fields(_))
-        || plan.scene().scan.outside_flow != (Outside::Error {})
-    {
+    if !plan.scene().flow.is_stored() || plan.scene().scan.outside_flow != (Outside::Error {}) {
         return Ok(());
     }
     let last_m = g.first_layer_range_m + g.layers.saturating_sub(1) as f64 * g.layer_thickness_m;

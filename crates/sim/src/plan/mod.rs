@@ -20,7 +20,7 @@ use crate::plan::geometry::Geometry;
 use crate::plan::instrument::Instrument;
 use crate::plan::wind::SceneWind;
 use crate::quantities;
-use crate::scene::{Flow, Pattern, Scene, SceneFile};
+use crate::scene::{Flow, Scene, SceneFile};
 use std::fmt;
 use std::sync::Arc;
 use wakescope_optics::plan::Plan as ScreenPlan;
@@ -171,11 +171,10 @@ impl Plan {
     }
 
     /// The key that reduces the lines of sight.
-    pub(crate) fn fewer_lines(&self) -> &'static str {
-        match self.scene().scan.pattern {
-            Pattern::Rhi {} => "a larger scan.elevation_step_rad",
-            Pattern::Ppi { .. } | Pattern::Axial { .. } => "a larger scan.pattern.azimuth_step_rad",
-            _ => "fewer lines of sight",
+    pub(crate) fn fewer_lines(&self) -> String {
+        match self.scene().scan.pattern.step_key() {
+            Some(key) => format!("a larger {key}"),
+            None => "fewer lines of sight".into(),
         }
     }
 

@@ -153,14 +153,8 @@ fn above_ground(file: &SceneFile, scan: &Schedule) -> Result<(), Error> {
     else {
         return Ok(());
     };
-    let key = match &s.pattern {
-        Pattern::Rhi {} | Pattern::Axial { .. } => "scan.elevation_min_rad",
-        Pattern::Ppi { .. } => "scan.pattern.elevations_rad",
-        Pattern::List { .. } => "scan.pattern.file",
-        _ => "scan.pattern.elevation_rad",
-    };
     let problem = Problem {
-        key: key.into(),
+        key: s.pattern.lowest_key().into(),
         value: format!("{:?}", lowest.elevation_rad),
         allowed: format!(
             "beams above the ground up to scan.range_max_m; the one at {:.3} s ends {:.3} m below it, which \

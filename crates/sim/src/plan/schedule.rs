@@ -3,7 +3,6 @@
 
 use super::Plan;
 use crate::SPEED_OF_LIGHT_M_S;
-use crate::scene::Flow;
 
 /// What is to be known of a scan before it runs.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -40,14 +39,8 @@ impl Plan {
         } else {
             revisit_s
         };
-        let flows = || std::iter::once(&scene.flow).chain(&scene.added_flows);
-        let pair = flows().find_map(|flow| {
-            if let Flow::VortexPair(pair) = flow {
-                Some(pair)
-            } else {
-                None
-            }
-        });
+        let mut flows = std::iter::once(&scene.flow).chain(&scene.added_flows);
+        let pair = flows.find_map(|flow| flow.pair());
         let wake_moves_m = pair.map_or(f64::NAN, |pair| {
             meanwhile_s * crate::plan::wind::vortex_pair(pair).descent_speed_m_s()
         });

@@ -57,11 +57,7 @@ impl SceneWind {
             Flow::Simulated(flow) => planes::simulated(flow, file),
             Flow::Fields(flow) => fields::fields(flow, file),
             _ => {
-                let tau = if let Flow::VortexPair(pair) = flow {
-                    pair.age_tau
-                } else {
-                    0.0
-                };
+                let tau = flow.pair().map_or(0.0, |pair| pair.age_tau);
                 let found = Self::of(analytic_wind(flow)?, "the flow is analytic".into());
                 Ok(Self {
                     start_s: start_s(flow),
@@ -257,8 +253,8 @@ pub(crate) fn circulation_profile(profile: CoreProfile) -> les::CirculationProfi
 
 /// Age of an analytic flow when the scan begins, s.
 pub fn start_s(flow: &Flow) -> f64 {
-    match flow {
-        Flow::VortexPair(pair) if pair.age_tau > 0.0 && pair.circulation_m2_s > 0.0 => {
+    match flow.pair() {
+        Some(pair) if pair.age_tau > 0.0 && pair.circulation_m2_s > 0.0 => {
             vortex_pair(pair).time_s(pair.age_tau)
         }
         _ => 0.0,

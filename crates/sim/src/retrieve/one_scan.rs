@@ -11,7 +11,7 @@ use crate::io::scans::ReadScan;
 use crate::measure::response::SceneResponse;
 use crate::plan::instrument::Instrument;
 use crate::progress::Observer;
-use crate::scene::{Flow, RetrievalMethod as Method, Scene, SceneFile};
+use crate::scene::{RetrievalMethod as Method, Scene, SceneFile};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use ndarray::Array2;
 use wakescope_estimate::retrieval::{
@@ -99,10 +99,8 @@ pub fn scene_of(scan: &ReadScan, observer: &dyn Observer) -> Result<Option<Scene
 /// How scans are retrieved: with the ground, the profile and the secondary vortices of the scene, if it is known; cores are fitted
 /// unless one is to be kept.
 pub fn options(scene: Option<&Scene>, gate: Gate, core_radius_m: Option<f64>) -> RetrievalOptions {
-    let profile = scene.and_then(|scene| match scene.flow {
-        Flow::VortexPair(pair) => Some(pair.profile),
-        _ => None,
-    });
+    let pair = scene.and_then(|scene| scene.flow.pair());
+    let profile = pair.map(|pair| pair.profile);
     // Long gates do not show cores: without what is known of them they run away with the circulation.
     let is_short = matches!(&gate, Gate::Point)
         || matches!(&gate, Gate::Gaussian { std_m } if *std_m <= LONG_GATE_M);

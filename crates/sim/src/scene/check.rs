@@ -7,8 +7,8 @@ use super::estimator::check_estimator;
 use super::flow::check_flow;
 use super::retrieval::check_retrieval;
 use super::{
-    DetectorSignal, EfficiencyOfPulse, Flow, Outside, Pattern, PulseShape, Scan, Scene,
-    SnrReference, SpectrumKind, Turbulence,
+    DetectorSignal, EfficiencyOfPulse, Outside, PulseShape, Scan, Scene, SnrReference,
+    SpectrumKind, Turbulence,
 };
 use crate::keys::{Checker, Declared as _, Problem, side};
 
@@ -165,7 +165,7 @@ impl Scene {
             ];
             c.compare(keys, [t.outer_scale_m, t.inner_scale_m], "above");
         }
-        if let Flow::VortexPair(p) = &self.flow {
+        if let Some(p) = self.flow.pair() {
             let (core_m, spacing_m) = (p.core_radius_m, p.spacing_m);
             let below = format!("below half of flow.spacing_m, {} m", 0.5 * spacing_m);
             let above = format!("above twice flow.core_radius_m, {} m", 2.0 * core_m);
@@ -176,7 +176,7 @@ impl Scene {
             c.between(core_m < 0.5 * spacing_m, &sides);
         }
         self.check_band(c);
-        if matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Axial { .. }) {
+        if self.scan.pattern.has_scan_elevations() {
             self.check_lines(c);
         }
         self.check_scan_between(c);
@@ -428,6 +428,7 @@ fn check_lengths(counts: &[(&str, usize)], table: &str, c: &mut Checker<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Flow;
     use crate::scene::SceneFile;
     use std::path::Path;
 

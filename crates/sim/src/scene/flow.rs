@@ -161,6 +161,31 @@ keys! {
     }
 }
 
+impl Flow {
+    /// The analytic vortex pair, if this is one.
+    pub(crate) fn pair(&self) -> Option<&VortexPair> {
+        match self {
+            Self::VortexPair(pair) => Some(pair),
+            _ => None,
+        }
+    }
+
+    /// Whether the wind is read from files.
+    pub(crate) fn is_stored(&self) -> bool {
+        matches!(self, Self::Simulated(_) | Self::Fields(_))
+    }
+
+    /// Whether the flow is that of a wake, which has an age.
+    pub(crate) fn is_wake(&self) -> bool {
+        matches!(self, Self::VortexPair(_) | Self::Simulated(_))
+    }
+
+    /// Whether there are vortices to be found.
+    pub(crate) fn has_vortices(&self) -> bool {
+        self.is_wake() && self.pair().is_none_or(|pair| pair.circulation_m2_s > 0.0)
+    }
+}
+
 /// The limits of a wind whose table is at `at`.
 pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
     let key = |name: &str| format!("{at}.{name}");

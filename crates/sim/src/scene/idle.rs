@@ -82,7 +82,7 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
         "scan.pattern.kind = \"{}\" has angles of its own",
         scan.pattern.name()
     );
-    let rows = matches!(scan.pattern, Pattern::Rhi {} | Pattern::Axial { .. });
+    let rows = scan.pattern.has_scan_elevations();
     unused(
         !rows,
         &["scan.elevation_min_rad", "scan.elevation_max_rad"],
@@ -90,7 +90,7 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
     );
     unused(!rows, &["scan.elevation_step_rad"], angles.clone());
     unused(
-        !matches!(scan.pattern, Pattern::Rhi {} | Pattern::Stare { .. }),
+        !scan.pattern.has_scan_azimuth(),
         &["scan.azimuth_rad"],
         angles,
     );

@@ -136,6 +136,54 @@ impl Default for Pattern {
     }
 }
 
+impl Pattern {
+    /// Whether the head may turn during a line.
+    pub(crate) fn may_turn(&self) -> bool {
+        matches!(self, Self::Rhi {} | Self::Ppi { .. } | Self::Axial { .. })
+    }
+
+    /// Whether sweeps may go back and forth.
+    fn may_alternate(&self) -> bool {
+        matches!(self, Self::Rhi {} | Self::Ppi { .. })
+    }
+
+    /// Whether the lines have the elevations of `[scan]`.
+    pub(crate) fn has_scan_elevations(&self) -> bool {
+        matches!(self, Self::Rhi {} | Self::Axial { .. })
+    }
+
+    /// Whether the lines have the azimuth of `[scan]`.
+    pub(crate) fn has_scan_azimuth(&self) -> bool {
+        matches!(self, Self::Rhi {} | Self::Stare { .. })
+    }
+
+    /// Whether the beams determine the wind at each height.
+    pub(crate) fn has_beam_winds(&self) -> bool {
+        matches!(self, Self::Vad { .. } | Self::Dbs { .. })
+    }
+
+    /// Key of the angle between lines, if there is one.
+    pub(crate) fn step_key(&self) -> Option<&'static str> {
+        match self {
+            Self::Rhi {} => Some("scan.elevation_step_rad"),
+            Self::Ppi { .. } | Self::Axial { .. } => Some("scan.pattern.azimuth_step_rad"),
+            _ => None,
+        }
+    }
+
+    /// Key of the lowest line.
+    pub(crate) fn lowest_key(&self) -> &'static str {
+        match self {
+            Self::Rhi {} | Self::Axial { .. } => "scan.elevation_min_rad",
+            Self::Ppi { .. } => "scan.pattern.elevations_rad",
+            Self::List { .. } => "scan.pattern.file",
+            Self::Vad { .. } | Self::Dbs { .. } | Self::Stare { .. } => {
+                "scan.pattern.elevation_rad"
+            }
+        }
+    }
+}
+
 impl Default for WindOfPulses {
     fn default() -> Self {
         Self::Line {}
@@ -157,10 +205,7 @@ impl Scene {
         } = self.scan.head;
         let moves = motion == HeadMotion::Continuous;
         let pattern = self.scan.pattern.name();
-        let turning = matches!(
-            self.scan.pattern,
-            Pattern::Rhi {} | Pattern::Ppi { .. } | Pattern::Axial { .. }
-        );
+        let turning = self.scan.pattern.may_turn();
         let allowed = format!(
             "\"stepped\" with scan.pattern.kind = \"{pattern}\"; rhi, ppi and axial may be continuous"
         );
@@ -172,7 +217,7 @@ impl Scene {
             rate_rad_s,
             finite,
         );
-        let sweeping = matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Ppi { .. });
+        let sweeping = self.scan.pattern.may_alternate();
         let back = direction == SweepDirection::Alternate;
         let allowed = format!(
             "\"same\" with scan.pattern.kind = \"{pattern}\"; rhi and ppi may go back and forth"

@@ -1,6 +1,6 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
-use super::{Flow, NoiseModel, Pattern, Scan, Scene, Weighting};
+use super::{NoiseModel, Pattern, Scan, Scene, Weighting};
 use crate::beams::direction::sin_cos_of_turn;
 use crate::keys::{Checker, Is, keys};
 use wakescope_estimate::vortex_fit::{LiftSlope, Secondary};
@@ -93,11 +93,7 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
         "a rate",
         one,
     );
-    let has_vortices = match &scene.flow {
-        Flow::VortexPair(pair) => pair.circulation_m2_s > 0.0,
-        Flow::Simulated(_) => true,
-        Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) | Flow::Fields(_) => false,
-    };
+    let has_vortices = scene.flow.has_vortices();
     let allowed =
         "a flow with vortices: flow.kind = \"vortex_pair\" with a circulation, or \"simulated\"";
     c.require(has_vortices, "retrieval", "a table", allowed);

@@ -8,7 +8,7 @@ use crate::measure::beam_winds::BeamWind;
 use crate::measure::profile::RangeProfile;
 use crate::plan::Plan;
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
-use crate::scene::{Flow, SnrReference};
+use crate::scene::SnrReference;
 use wakescope_optics::EfficiencyProfile;
 
 /// Signal-to-noise ratio and efficiency against range, each with its standard error as a band.
@@ -296,7 +296,7 @@ pub(super) fn scan(plan: &Plan) -> Figure {
 /// What is shown, of which age and from how many realisations.
 fn title(plan: &Plan, has_gaps: bool) -> String {
     let mut words = vec!["Radial velocity [m/s], positive away from the lidar".to_owned()];
-    if matches!(plan.scene().flow, Flow::VortexPair(_) | Flow::Simulated(_)) {
+    if plan.scene().flow.is_wake() {
         let scan_s = plan.scan_end_s() - plan.wind.start_s;
         words.push(format!(
             "age τ = {:.2} at the start of the scan, which takes {scan_s:.2} s",
@@ -315,11 +315,9 @@ fn title(plan: &Plan, has_gaps: bool) -> String {
 
 /// Centres of the vortices that the picture marks, where they are known.
 fn centres_m(plan: &Plan) -> Vec<(f64, f64)> {
-    match &plan.scene().flow {
-        Flow::VortexPair(pair) => {
-            let c = crate::plan::wind::vortex_pair(pair).centres(plan.wind.start_s);
-            vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
-        }
-        _ => Vec::new(),
-    }
+    let Some(pair) = plan.scene().flow.pair() else {
+        return Vec::new();
+    };
+    let c = crate::plan::wind::vortex_pair(pair).centres(plan.wind.start_s);
+    vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
 }
