@@ -1,12 +1,12 @@
 //! `cargo xtask tidy`: the rules of the house that no compiler checks.
 //!
-//! Who may depend on whom, no circles of imports, links of pages and the files and tests that they
+//! Who may depend on whom, no circles of imports, no imports of higher layers, links of pages and the files and tests that they
 //! name, private paths, units in public names, heads of reference files.
 
 mod links;
 
 use crate::process::output;
-use crate::sources::{Modules, circles, is_test_file};
+use crate::sources::{Imports, Modules, circles, is_test_file};
 use crate::workspace::{read, root};
 use fixtures::failure::{Failure, Outcome};
 use serde::Deserialize;
@@ -29,6 +29,10 @@ struct Rules {
     without_unit: Vec<(String, String)>,
     /// Crates of the workspace that each crate may depend on.
     may_depend_on: BTreeMap<String, BTreeSet<String>>,
+    /// Modules of a crate from the lowest to the highest: each imports those before it alone.
+    layers: BTreeMap<String, Vec<String>>,
+    /// Modules of a crate that are in no layer.
+    beside_layers: BTreeMap<String, BTreeSet<String>>,
     /// Other crates that one crate alone may depend on.
     for_one_crate: BTreeMap<String, String>,
 }
@@ -95,7 +99,7 @@ pub(crate) fn run() -> Outcome {
         let manifest = read(&format!("{folder}/Cargo.toml"))?;
         check_manifest(folder, allowed, &manifest, &mut found);
     }
-    check_circles(&files, &mut found);
+    check_imports(&files, &mut found);
     links::check(&files, &paths, &mut found);
     if found.is_empty() {
         println!("tidy: {} files, no violations", paths.len());
@@ -213,8 +217,8 @@ fn is_excused(path: &str, name: &str) -> bool {
     excused.any(|(start, number)| path.starts_with(start) && name == number)
 }
 
-/// Files that import one another in a circle: neither can be read, tested or moved without the other.
-fn check_circles(files: &[SourceFile], found: &mut Vec<String>) {
+/// Imports of files: no circle, and none of a higher layer.
+fn check_imports(files: &[SourceFile], found: &mut Vec<String>) {
     let mut sources = Vec::new();
     for file in files {
         if !is_test_file(&file.path) {
@@ -222,7 +226,15 @@ fn check_circles(files: &[SourceFile], found: &mut Vec<String>) {
         }
     }
     let imports = Modules::new(&sources).imports(true);
-    for circle in circles(&imports) {
+    check_circles(&imports, found);
+    for (folder, layers) in &RULES.layers {
+        check_layers(&imports, folder, layers, found);
+    }
+}
+
+/// Files that import one another in a circle: neither can be read, tested or moved without the other.
+fn check_circles(imports: &Imports<'_>, found: &mut Vec<String>) {
+    for circle in circles(imports) {
         for from in &circle {
             for (to, names) in &imports[from] {
                 if !circle.contains(to) {
@@ -237,6 +249,43 @@ fn check_circles(files: &[SourceFile], found: &mut Vec<String>) {
             }
         }
     }
+}
+
+/// Modules of a crate that import a higher layer, or have no layer.
+fn check_layers(imports: &Imports<'_>, folder: &str, layers: &[String], found: &mut Vec<String>) {
+    let beside = RULES.beside_layers.get(folder);
+    for (from, taken) in imports {
+        let Some(module) = top_module(from, folder) else {
+            continue;
+        };
+        if beside.is_some_and(|names| names.contains(module)) {
+            continue;
+        }
+        let Some(layer) = layers.iter().position(|name| name == module) else {
+            found.push(format!(
+                "{from}: `{module}` is not among the layers of tidy.toml"
+            ));
+            continue;
+        };
+        let higher = &layers[layer + 1..];
+        for (to, names) in taken {
+            let is_higher = |module| higher.iter().any(|name| name == module);
+            if top_module(to, folder).is_some_and(is_higher) {
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                found.push(format!(
+                    "{from}: imports a higher layer: {} from {to}",
+                    names.join(", ")
+                ));
+            }
+        }
+    }
+}
+
+/// The module right below the root of a crate that a file belongs to; none for the root itself.
+fn top_module<'f>(file: &'f str, folder: &str) -> Option<&'f str> {
+    let path = file.strip_prefix(folder)?.strip_prefix("/src/")?;
+    let module = path.split('/').next()?.trim_end_matches(".rs");
+    (module != "lib" && module != "main").then_some(module)
 }
 
 /// A reference file says what it holds before its numbers.
@@ -372,10 +421,39 @@ mod tests {
             file("xtask/src/b.rs", "use super::a::g;\nfn f() {}\n"),
         ];
         let mut found = Vec::new();
-        check_circles(&sources, &mut found);
+        check_imports(&sources, &mut found);
         assert_eq!(
             found[0],
             "xtask/src/a.rs: in a circle of imports of 2 files: f from xtask/src/b.rs"
+        );
+    }
+
+    #[test]
+    fn an_import_of_a_higher_layer_is_reported_with_its_names() {
+        let layers = ["scene", "plan"].map(String::from);
+        let plan = (
+            "crates/x/src/plan/stage.rs",
+            "pub fn f() { crate::scene::g() }\n",
+        );
+        let scene = |text| ("crates/x/src/scene.rs", text);
+        let violations = |files: &[(&'static str, &str)]| {
+            let mut found = Vec::new();
+            let imports = Modules::new(files).imports(true);
+            check_layers(&imports, "crates/x", &layers, &mut found);
+            found
+        };
+        assert!(violations(&[plan, scene("pub fn g() {}\n")]).is_empty());
+        assert_eq!(
+            violations(&[plan, scene("use crate::plan::stage::f;\npub fn g() {}\n")]),
+            ["crates/x/src/scene.rs: imports a higher layer: f from crates/x/src/plan/stage.rs"]
+        );
+        let other = (
+            "crates/x/src/other.rs",
+            "fn h() { crate::plan::stage::f() }\n",
+        );
+        assert_eq!(
+            violations(&[plan, scene("pub fn g() {}\n"), other]),
+            ["crates/x/src/other.rs: `other` is not among the layers of tidy.toml"]
         );
     }
 }

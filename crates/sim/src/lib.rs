@@ -48,6 +48,7 @@
 pub mod accuracy;
 pub mod beams;
 pub mod detection;
+mod document;
 pub mod flow;
 mod interpolation;
 pub mod io;

@@ -149,7 +149,7 @@ impl Outputs {
     }
 }
 
-/// Writes files whose contents are there, such as those of a [`crate::cli::Answer`], to a folder, all or none; returns their paths.
+/// Writes files whose contents are there, such as those that a command returned, to a folder, all or none; returns their paths.
 ///
 /// # Errors
 /// Names that are not plain; a file in the way that may not be replaced; another run that writes there; what the system says.

@@ -12,9 +12,7 @@ use super::{Report, Request, Row, Setting};
 use crate::Error;
 use crate::interpolation::interpolate;
 use crate::io::csv::float_text;
-use crate::measure::efficiency_model::{
-    drawn_turbulence, model, signals_cross_screens, stretches, turbulence,
-};
+use crate::measure::efficiency_model::{drawn_turbulence, model, signals_cross_screens, stretches};
 use crate::measure::map;
 use crate::measure::profile::LineOptics;
 use crate::measure::scan::Scanner;
@@ -244,7 +242,7 @@ impl<'a> Study<'a> {
             settings.push((REALISATIONS, scaled(&self.file.content, REALISATIONS)));
         }
         let has_effect = self.metrics.contains(&Metric::Efficiency) || !self.response.is_empty();
-        if let Some(t) = turbulence(scene).filter(|_| has_effect) {
+        if let Some(t) = scene.refractive_turbulence().filter(|_| has_effect) {
             if t.sampling == ScreenSampling::Explicit {
                 settings.push((LAYERS, scaled(scene, LAYERS)));
                 settings.push((GRID_POINTS, scaled(scene, GRID_POINTS)));

@@ -42,7 +42,8 @@ pub use wake::REPEATS;
 pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};
 
 use crate::Error;
-use crate::keys::{Content, Document, Problem, SceneError, to_table};
+use crate::document::{Content, Document};
+use crate::keys::{Problem, SceneError, to_table};
 use std::path::{Path, PathBuf};
 
 /// A valid case, with what names it.

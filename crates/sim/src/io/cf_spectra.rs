@@ -4,7 +4,21 @@
 use super::error::OutputResult;
 use super::netcdf::{Data, Layout, described};
 use super::provenance::Provenance;
-use crate::measure::recorded::Spectra;
+
+/// Spectra \[line, gate, velocity\] of all scans.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spectra {
+    /// Velocity of each frequency in the band, m/s, positive away from the lidar, increasing.
+    pub velocity_m_s: Vec<f64>,
+    /// Range of each gate, m.
+    pub range_m: Vec<f64>,
+    /// Elevation of each line of all scans, rad.
+    pub elevation_rad: Vec<f64>,
+    /// Time of each line, s.
+    pub time_s: Vec<f64>,
+    /// Density over that of the scene's noise, or over the mean in the band without noise.
+    pub density: Vec<f32>,
+}
 
 /// The file's bytes.
 ///

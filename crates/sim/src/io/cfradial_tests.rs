@@ -3,7 +3,7 @@
 use super::super::provenance::example;
 use super::super::samples;
 use super::*;
-use crate::scene::Site;
+use crate::io::Site;
 use netcdf3::FileReader;
 
 /// Writes the map, and opens it with a reader that shares no code with the writer.

@@ -3,9 +3,9 @@
 //! Check: each rule of `check` is broken once by a test; positions follow from ray geometry.
 
 use super::error::{OutputError, OutputResult, increasing, same_length};
+use super::site::Site;
 use super::utc::UtcTime;
 use crate::beams::{Direction, SweepMode};
-use crate::scene::Site;
 use ndarray::{Array2, Array3, Axis};
 use std::f64::consts::FRAC_PI_2;
 use wakescope_les::winds::{Edges, Side};

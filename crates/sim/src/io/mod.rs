@@ -8,7 +8,7 @@
 //! | [`map`] | (data) [`VelocityMap`], [`CrossPlanes`] | - |
 //! | [`fields`] | (data) [`VelocityField`] | - |
 //! | [`provenance`] | (data) where a file comes from | - |
-//! | [`utc`] | (data) dates of a measurement | - |
+//! | [`utc`], [`Site`] | (data) dates and place of a measurement | - |
 //! | [`Existing`] | existing files of the names of outputs: refused or replaced | - |
 //! | [`csv`] | any table | - |
 //! | [`csv_input`] | (reader) tables of texts | - |
@@ -56,10 +56,12 @@ pub mod raw;
 pub mod scan_list;
 pub mod scans;
 pub mod signals;
+mod site;
 pub mod tables;
 pub mod utc;
 
 pub use atomic::{FileGroup, write_atomic};
+pub use cf_spectra::Spectra;
 pub use csv::Table;
 pub use error::{OutputError, OutputResult};
 #[cfg(feature = "plots")]
@@ -69,6 +71,7 @@ pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
 pub use parts::{FileParts, Share};
 pub use provenance::{Provenance, hash_of};
+pub use site::Site;
 pub(crate) use utc::MAX_TIME_S;
 pub use utc::UtcTime;
 

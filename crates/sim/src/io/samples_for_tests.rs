@@ -1,7 +1,7 @@
 //! Small made-up results for the tests of the writers: two sweeps, missing values, a stretched mesh.
 
 use super::map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
-use crate::scene::Site;
+use crate::io::Site;
 use ndarray::{Array2, Array3};
 
 /// Two sweeps of 6 rays, 5 gates; NaN in a corner.

@@ -8,7 +8,6 @@
 //! Check: each key of a scene and of every case is given values of the wrong kind; the refusal names that key.
 
 mod declare;
-mod document;
 mod key;
 mod limit;
 mod problem;
@@ -19,7 +18,6 @@ pub(crate) use declare::{
     Declared, behaviour, choice, default_of, foreign_choices, from_table, held, keys, keys_of,
     kinds, read_key, second, table, to_table, write_key, written,
 };
-pub use document::{Content, Document};
 pub(crate) use key::{Key, Kind, join};
 pub(crate) use limit::{ABOVE_ZERO, FINITE};
 pub(crate) use limit::{ABOVE_ZERO_OR_INF, Checker, Is, Limit, Named, Number, ZERO_OR_MORE, side};

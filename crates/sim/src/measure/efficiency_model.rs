@@ -4,13 +4,13 @@
 //! Only turbulence that both beams share (monostatic) needs phase screens.
 
 use crate::plan::geometry::Geometry;
-use crate::scene::{EfficiencyOfPulse, RefractiveTurbulence, Scene, SnrReference, Turbulence};
+use crate::scene::{EfficiencyOfPulse, RefractiveTurbulence, Scene, SnrReference};
 use wakescope_optics::Cn2Path;
 use wakescope_optics::plan::{Model, cheapest_model};
 
 /// The cheapest model of the efficiency that is valid for a scene.
 pub(crate) fn model(scene: &Scene) -> Model {
-    let cn2 = match turbulence(scene) {
+    let cn2 = match scene.refractive_turbulence() {
         None => Cn2Path::None,
         Some(t) => Cn2Path::Uniform {
             cn2_m_m23: t.cn2_m_m23,
@@ -19,17 +19,11 @@ pub(crate) fn model(scene: &Scene) -> Model {
     cheapest_model(scene.telescope.receiver, &cn2)
 }
 
-/// The turbulence of a scene, if there is any.
-pub(crate) fn turbulence(scene: &Scene) -> Option<RefractiveTurbulence> {
-    match scene.atmosphere.turbulence {
-        Turbulence::Refractive(t) if t.cn2_m_m23 > 0.0 => Some(t),
-        _ => None,
-    }
-}
-
 /// The turbulence of a scene whose pulses each have the efficiency of one realisation.
 pub(crate) fn drawn_turbulence(scene: &Scene) -> Option<RefractiveTurbulence> {
-    turbulence(scene).filter(|t| t.efficiency == EfficiencyOfPulse::Realisation)
+    scene
+        .refractive_turbulence()
+        .filter(|t| t.efficiency == EfficiencyOfPulse::Realisation)
 }
 
 /// How close the ranges of quadratures are where there are more: what is joined between them is within 0.005 dB.

@@ -37,7 +37,7 @@ pub(crate) type WindowSums<'a, S> = ScanSums<'a, S, dyn Statistic<S>>;
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub(crate) fn places_of(plan: &Plan, record_elevation_rad: &[f64]) -> Result<ScanGeometry, Error> {
+pub(crate) fn windows_at(plan: &Plan, record_elevation_rad: &[f64]) -> Result<ScanGeometry, Error> {
     let (scene, samples) = (plan.scene(), plan.geometry.samples);
     let (sampling, gates) = (scene.sampling()?, scene.gates()?);
     Ok(ScanGeometry::new(

@@ -6,7 +6,7 @@
 use crate::Error;
 use crate::interpolation::{interpolate, linspace};
 use crate::measure::efficiency_model::{
-    MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence,
+    MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, stretches,
 };
 use crate::measure::plane;
 use crate::memo::Memo;
@@ -95,7 +95,7 @@ pub(crate) fn planned(plan: &Plan) -> Result<PlannedStage, Error> {
     }
     // A table through turbulence has the free-space and the exact bistatic curves beside the Monte
     // Carlo: mean, scatter and error of each model.
-    let (places, models) = match turbulence(scene) {
+    let (places, models) = match scene.refractive_turbulence() {
         Some(_) => (16, 5.0),
         None => (0, 1.0),
     };
@@ -184,7 +184,7 @@ impl LineOptics<'_> {
         let theory = efficiency_by_theory(instrument, range_m)?;
         let (mut others, mut lost_power_fraction) = (Vec::new(), None);
         let mut efficiency = theory.clone();
-        if turbulence(scene).is_some() {
+        if scene.refractive_turbulence().is_some() {
             let ([monostatic, bistatic], lost) = self.across_screens(&theory)?;
             lost_power_fraction = Some(lost);
             if model(scene) == Model::MonteCarlo {
@@ -293,7 +293,7 @@ impl LineOptics<'_> {
     fn run_screens(&self, range_m: Vec<f64>) -> Result<Screens, Error> {
         let (scene, instrument, observer) =
             (self.plan.scene(), &self.plan.instrument, self.observer);
-        let t = turbulence(scene).unwrap_or_default();
+        let t = scene.refractive_turbulence().unwrap_or_default();
         observer.begin(Stage::PhaseScreens, t.realisations as u64);
         let mut seen = 0;
         // Single precision: its rounding is far below the error of any number of realisations.
@@ -447,7 +447,7 @@ pub(crate) struct Screens {
 /// What a curve depends on: on the seed only in turbulence, where screens may be drawn.
 fn cause(scene: &Scene, range_m: &[f64]) -> String {
     let (air, laser) = (&scene.atmosphere.turbulence, scene.laser.wavelength_m);
-    let seed = turbulence(scene).map(|_| scene.seed);
+    let seed = scene.refractive_turbulence().map(|_| scene.seed);
     hash_of(&format!(
         "{:?}",
         (laser, &scene.telescope, air, seed, range_m)

@@ -2,9 +2,7 @@
 //! it.
 
 use crate::Error;
-use crate::measure::efficiency_model::{
-    OF_SCREENS, model, signals_cross_screens, stretches, turbulence,
-};
+use crate::measure::efficiency_model::{OF_SCREENS, model, signals_cross_screens, stretches};
 use crate::measure::profile::{EfficiencyMemo, layer_ranges_m, table_ranges_m};
 use crate::plan::{Plan, PlannedStage, Stage};
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling};
@@ -25,7 +23,7 @@ pub(crate) fn planned(
         let stage = PlannedStage::skipped(Stage::PhaseScreens, why);
         Ok((stage, Arc::default()))
     };
-    let Some(t) = turbulence(plan.scene()) else {
+    let Some(t) = plan.scene().refractive_turbulence() else {
         return skipped("no turbulence: atmosphere.turbulence");
     };
     let ranges_m = screen_ranges_m(plan);
@@ -68,7 +66,7 @@ pub(crate) fn planned(
 /// What is doubtful about the phase screens of a plan, each warning once.
 pub(crate) fn warnings(plan: &Plan, screens: &[ScreenPlan]) -> Vec<String> {
     let mut out = Vec::new();
-    let Some(t) = turbulence(plan.scene()) else {
+    let Some(t) = plan.scene().refractive_turbulence() else {
         return out;
     };
     for (range_m, screens) in screen_ranges_m(plan).iter().zip(screens) {

@@ -1,7 +1,6 @@
 //! The instrument of a scene and the air that it looks through, in the words of optics and signals: made once, and handed on.
 
 use crate::Error;
-use crate::measure::efficiency_model::turbulence as turbulence_of;
 use crate::scene::{
     DetectorSignal, Digitiser, NoiseModel, RefractiveTurbulence, Scene, ScreenSampling,
     SnrReference, SpectrumKind,
@@ -48,7 +47,10 @@ impl Instrument {
                 Some(signal::digitise::Digitiser::new(bits, full_scale_a)?)
             }
         };
-        let turbulence = turbulence_of(scene).map(|t| turbulence(&t)).transpose()?;
+        let turbulence = scene
+            .refractive_turbulence()
+            .map(|t| turbulence(&t))
+            .transpose()?;
         Ok(Self {
             telescope,
             pulse: scene.pulse.simulated()?,

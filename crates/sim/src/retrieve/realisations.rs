@@ -9,7 +9,7 @@ use super::table::{RetrievedScan, flags};
 use super::truth::{true_vortices, true_wake};
 use crate::Error;
 use crate::detection::{Calibration, DetectionSettings, SceneNoise, strided};
-use crate::measure::recorded::{Spectra, upward};
+use crate::measure::recorded::{spectra_of_samples, upward};
 use crate::measure::response::SceneResponse;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
@@ -207,7 +207,7 @@ fn of_signals<S: Sample + wakescope_signal::Sample>(
             field: "records of a realisation",
         })?;
     if method == Method::Envelope {
-        let spectra = Spectra::of_samples(plan, &scanner.layer_snr(), &elevation_rad, samples)?;
+        let spectra = spectra_of_samples(plan, &scanner.layer_snr(), &elevation_rad, samples)?;
         let lines = 0..spectra.elevation_rad.len();
         return Ok(
             envelopes(plan, &spectra, lines, own.snr_of(&wake), &mut of_map)

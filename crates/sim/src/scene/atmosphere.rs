@@ -87,6 +87,16 @@ keys! {
     }
 }
 
+impl super::Scene {
+    /// The refractive turbulence, if there is any.
+    pub(crate) fn refractive_turbulence(&self) -> Option<RefractiveTurbulence> {
+        match self.atmosphere.turbulence {
+            Turbulence::Refractive(t) if t.cn2_m_m23 > 0.0 => Some(t),
+            _ => None,
+        }
+    }
+}
+
 impl Atmosphere {
     /// The air that the signal simulation looks through.
     ///

@@ -18,8 +18,10 @@ mod read;
 mod records;
 mod retrieval;
 
+pub use crate::document::{Content, Document};
+pub use crate::io::Site;
 pub use crate::io::hash_of;
-pub use crate::keys::{Content, Document, Located, Problem, SceneError};
+pub use crate::keys::{Located, Problem, SceneError};
 pub use atmosphere::*;
 pub use estimator::*;
 pub use flow::*;
@@ -34,7 +36,6 @@ pub use wakescope_estimate::vortex_fit::{CoreProfile, LiftSlope, Secondary};
 pub use wakescope_optics::{RadiusDefinition, plan::Receiver as ReceiverPath};
 pub use wakescope_signal::NoiseModel;
 
-use crate::io::UtcTime;
 use crate::keys::{Is, keys};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -159,26 +160,6 @@ keys! {
         First = "first",
         /// Every one.
         All = "all",
-    }
-
-    /// Where the lidar stands and when the flow began; only written to the files.
-    table Site {
-        /// Name of the place.
-        name: String = "simulated runway".into() => Is(
-            |name: &String| name.chars().count() <= 80 && !name.chars().any(char::is_control),
-            "one line of at most 80 characters",
-        ),
-        /// Latitude, degrees north.
-        latitude_deg: f64 = 0.0 => -90.0..=90.0,
-        /// Longitude, degrees east.
-        longitude_deg: f64 = 0.0 => -180.0..=180.0,
-        /// Height of the ground above the sea, m.
-        altitude_m: f64 = 0.0 => -1e3..=1e4,
-        /// Date of the start of the flow, UTC.
-        start_utc: String = "2024-01-01T00:00:00Z".into() => Is(
-            |date: &String| UtcTime::parse(date).is_some(),
-            format!("a date from 1900 to 2199 like \"{}\"", UtcTime::FORM),
-        ),
     }
 }
 

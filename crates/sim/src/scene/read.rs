@@ -2,7 +2,8 @@
 
 use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, idle};
 use crate::Error;
-use crate::keys::{Content, Document, Format, Key, Text, keys_of, to_table, value_at};
+use crate::document::{Content, Document};
+use crate::keys::{Format, Key, Text, keys_of, to_table, value_at};
 use std::path::Path;
 use std::sync::LazyLock;
 

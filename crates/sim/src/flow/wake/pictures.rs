@@ -257,7 +257,11 @@ mod tests {
             output.planes_tau = Some(vec![0.0, 0.04]);
         }
         let file = |case: &FlowCase| {
-            CaseFile::parse(&crate::keys::Content::to_toml(case), Path::new("case.toml")).unwrap()
+            CaseFile::parse(
+                &crate::document::Content::to_toml(case),
+                Path::new("case.toml"),
+            )
+            .unwrap()
         };
         let folder = tempfile::tempdir().unwrap();
         case.time.pause_after_steps = Some(1);
@@ -303,7 +307,7 @@ mod tests {
             output.planes_tau = Some(vec![0.0, 0.02]);
         }
         let file = CaseFile::parse(
-            &crate::keys::Content::to_toml(&case),
+            &crate::document::Content::to_toml(&case),
             Path::new("case.toml"),
         )
         .unwrap();

@@ -10,7 +10,6 @@ pub use limits::Limits;
 
 use crate::Error;
 use crate::io::Table;
-use crate::measure::efficiency_model::turbulence;
 use crate::measure::profile::{EfficiencyMemo, LineOptics, efficiency_by_theory, free_space};
 use crate::plan::Plan;
 use crate::plan::instrument::Instrument;
@@ -347,7 +346,7 @@ impl<'a> Rows<'a> {
         let empty = free_space(instrument, &increasing(self.range_m))?;
         let antenna = self.at_each(&|r| Ok(empty.interpolated(r)? / passed.powi(2)))?;
         self.push("antenna efficiency", "eta_a", "free space".into(), antenna);
-        if let Some(air) = turbulence(scene) {
+        if let Some(air) = scene.refractive_turbulence() {
             let value = format!("Cn2 {} m^(-2/3)", scientific(air.cn2_m_m23));
             let left =
                 self.at_each(&|r| Ok(efficiency.interpolated(r)? / empty.interpolated(r)?))?;

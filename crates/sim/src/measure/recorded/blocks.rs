@@ -10,7 +10,7 @@ use super::{RecordedOptions, pieces, samples};
 use crate::Error;
 use crate::io::raw::RawRecords;
 use crate::measure::gate_estimates::GateEstimate;
-use crate::measure::map_estimator::{MapEstimator, places_of};
+use crate::measure::map_estimator::{MapEstimator, windows_at};
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::progress::Observer;
@@ -59,7 +59,7 @@ pub(super) fn scans<S: Sample>(
     let mut out = Vec::with_capacity(scans.len());
     // Repetitions of a scan share what was made for the first.
     for alike in scans.chunk_by(|a, b| a.elevation_rad == b.elevation_rad) {
-        let places = places_of(plan, &alike[0].all_records().1)?;
+        let places = windows_at(plan, &alike[0].all_records().1)?;
         let estimator = MapEstimator::<S>::new(plan, &layer_snr, &places)?;
         let tiles = tiles(
             &estimator,
@@ -145,7 +145,7 @@ impl<S: Sample> Blocks<'_, S> {
             (self.plan, &self.estimator, &tile.windows, &cells.lines);
         let of_records = lines.records(read);
         let of_samples = plan.scene().gates()?.samples(held);
-        let places = places_of(plan, &lines.record_elevation_rad(read))?;
+        let places = windows_at(plan, &lines.record_elevation_rad(read))?;
         let mut sums = estimator
             .sums(places, Some(held.clone()))?
             .scaled_for(self.largest);

@@ -13,11 +13,13 @@ mod result;
 mod spectra;
 mod tiles;
 
+pub use crate::io::Spectra;
 pub(crate) use lines::upward;
 pub use lines::{RayTable, ScanLines};
 pub use predicted::predicted_table;
 pub use result::{MeasuredScan, measured_map};
-pub use spectra::Spectra;
+pub(crate) use spectra::spectra_of_samples;
+use spectra::spectra_of_scans;
 
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
@@ -294,7 +296,7 @@ fn of_samples<S: Sample>(
         .filter_map(|scan| Some((&scan.lines, scan.spectra.as_deref()?)))
         .collect();
     let spectra = (!density.is_empty())
-        .then(|| Spectra::of(plan, &density))
+        .then(|| spectra_of_scans(plan, &density))
         .transpose()?;
     if is_run {
         return Ok(Recorded::OfRun {

@@ -131,7 +131,7 @@ fn within(elevation_rad: &[f64], some: &Range<usize>, reach_rad: f64) -> Range<u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::map_estimator::places_of;
+    use crate::measure::map_estimator::windows_at;
     use crate::plan::{Plan, Target};
     use crate::scene::SceneFile;
     use wakescope_estimate::map::PolarPoint;
@@ -153,7 +153,7 @@ mod tests {
         for (samples, words) in [(5_000, ""), (250_000, "gate_step_samples = 100")] {
             let plan = scene(samples, words);
             let elevation_rad = plan.geometry.elevation_rad.clone();
-            let places = places_of(&plan, &elevation_rad).unwrap();
+            let places = windows_at(&plan, &elevation_rad).unwrap();
             assert_eq!(plan.geometry.samples, samples);
             let layer_snr: Vec<(f64, f64)> = plan
                 .geometry

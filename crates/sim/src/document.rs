@@ -1,9 +1,7 @@
-//! A scene or a case that was checked, with what names it and where its lines stand.
+//! A checked scene or case, with its file, its hash and the lines of its keys.
 
-use super::problem::Located;
-use super::problem::{Problem, SceneError};
-use super::vet::Text;
 use crate::io::{Provenance, hash_of, text_file};
+use crate::keys::{Located, Problem, SceneError, Text};
 use std::path::{Path, PathBuf};
 
 /// What a file says: a scene or a case.
