@@ -10,7 +10,7 @@
 use std::error::Error;
 
 use ndarray::Array2;
-use wakescope_estimate::retrieval::{Gate, RetrievalOptions, ScanMap, fit_scan};
+use wakescope_estimate::retrieval::{Gate, RetrievalOptions, ScanMap, Velocities, fit_scan};
 use wakescope_estimate::vortex_fit::{Follower, LiftSlope, RangeKernel, Wake, WakeModel};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => made_up(&options.model)?,
     };
     let begin = std::time::Instant::now();
-    let found = fit_scan(&map, &options)?;
+    let found = fit_scan(&map, Velocities::Means, &options)?.result;
     println!(
         "vortex,circulation_m2_s,std,gamma_5_15_m2_s,std,lateral_position_m,std,height_m,std,core_radius_m,std"
     );

@@ -7,7 +7,7 @@
 
 use std::error::Error;
 use std::path::PathBuf;
-use wakescope_estimate::retrieval::{Gate, RetrievalOptions, fit_scan};
+use wakescope_estimate::retrieval::{Gate, RetrievalOptions, Velocities, fit_scan};
 use wakescope_estimate::vortex_fit::{Wake, WakeModel};
 use wakescope_sim::io::scans::{ScanFormat, read};
 
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..RetrievalOptions::default()
     };
     for scan in scans {
-        let found = fit_scan(&scan.map, &options)?;
+        let found = fit_scan(&scan.map, Velocities::Means, &options)?.result;
         println!(
             "sweep {}: statistic {:.1}, {:?}",
             scan.sweep, found.statistic, found.flags

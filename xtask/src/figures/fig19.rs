@@ -4,9 +4,7 @@ use super::context::*;
 use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{ScanMap, Turbulence};
 use wakescope_estimate::wake_detection::DetectorOptions;
-use wakescope_sim::detection::{
-    Calibration, DetectionSettings, Power, SceneNoise, detect, strided,
-};
+use wakescope_sim::detection::{Calibration, DetectionSettings, Power, SceneNoise, detect};
 use wakescope_sim::measure::budget::snr_without_screens_db;
 use wakescope_sim::measure::map::velocities;
 use wakescope_sim::retrieve::gate_of;
@@ -89,7 +87,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         let noise = SceneNoise::new(&plan, &Silent)?;
         for (background, turbulence) in [("still air", None), ("turbulence", Some(AIR))] {
             let settings = settings(&plan, &noise, turbulence, FALSE_ALARM)?;
-            let empty = strided(&noise.empty_scan(&plan), settings.stride);
+            let empty = noise
+                .empty_scan(&plan)
+                .strided(settings.stride.0, settings.stride.1);
             let calibration = Calibration::new(&empty, &settings, &Silent)?;
             let power = calibration.power(&settings, &Silent)?;
             cases.push(Case {

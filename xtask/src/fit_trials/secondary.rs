@@ -18,8 +18,7 @@ use std::f64::consts::{PI, TAU};
 use std::path::Path;
 use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{
-    Flag, Gate, RetrievalOptions, ScanMap, ScanResult, expected_velocities, fit_scan,
-    with_secondary_vortices,
+    Flag, Gate, RetrievalOptions, ScanMap, ScanResult, Velocities, expected_velocities, fit_scan,
 };
 use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Secondary, Vortex, Wake};
 use wakescope_sim::retrieve::{self, RetrievalRow};
@@ -241,21 +240,19 @@ fn map_errors(kind: &MapKind, seed: u64) -> Result<Option<ScanErrors>, Failure> 
     map.velocity_m_s = expected_velocities(&map, &true_options, &truth, kind.duration_s > 0.0)?;
     map.velocity_m_s
         .mapv_inplace(|v| v + kind.noise_m_s * draw_normal(&mut rng));
-    let pair = fit_scan(&map, &options)?;
     let with_secondary = |secondary| {
         let options = RetrievalOptions {
             secondary,
             ..options.clone()
         };
-        with_secondary_vortices(&map, &options, &pair)
+        fit_scan(&map, Velocities::Means, &options)
     };
-    let shows_secondary = with_secondary(Secondary::Never)?.is_some();
-    let four = with_secondary(Secondary::Always)?;
-    let four = four.as_ref().map_or(&pair, |(four, _)| four);
+    let pair = with_secondary(Secondary::Never)?.result;
+    let four = with_secondary(Secondary::Always)?.result;
     let scan = ScanErrors {
-        shows_secondary,
+        shows_secondary: pair.has(Flag::SecondaryVortices),
         pair: result_errors(&pair, &truth, kind.wake.profile),
-        four: result_errors(four, &truth, kind.wake.profile),
+        four: result_errors(&four, &truth, kind.wake.profile),
     };
     Ok(scan.is_complete().then_some(scan))
 }

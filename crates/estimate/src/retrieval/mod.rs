@@ -3,7 +3,9 @@
 //! | module | content |
 //! |---|---|
 //! | `scan_map`, `options`, `result` | what goes in, how, what comes out |
-//! | `fit`, `hypotheses`, `report` | fits of wind alone, one vortex and two; which it is; deviations and flags |
+//! | `fit` | [`fit_scan`], whatever the velocities are |
+//! | `gate_means`, `hypotheses`, `report` | fits of means: of wind alone, one vortex and two; which it is; deviations and flags |
+//! | `estimates` | the fit to what an estimator of this crate makes of a wake |
 //! | `aliases` | winds beyond the Nyquist interval |
 //! | `plausible` | what the vortices of an aircraft can be |
 //! | `gates`, `whitening` | what a velocity is of the air; correlated velocities |
@@ -13,7 +15,7 @@
 //!
 //! ```
 //! use ndarray::Array2;
-//! use wakescope_estimate::retrieval::{Flag, RetrievalOptions, ScanMap, fit_scan};
+//! use wakescope_estimate::retrieval::{Flag, RetrievalOptions, ScanMap, Velocities, fit_scan};
 //!
 //! // a wind of 3 m/s and nothing else
 //! let elevation_rad: Vec<f64> = (0..30).map(|i| 0.007 * f64::from(i)).collect();
@@ -21,7 +23,7 @@
 //! let range_m = (0..20).map(|j| 330.0 + 7.0 * f64::from(j)).collect();
 //! let time_s = vec![0.0; 30];
 //! let map = ScanMap { elevation_rad, time_s, range_m, velocity_m_s, sigma_m_s: None, fold_m_s: None };
-//! let found = fit_scan(&map, &RetrievalOptions::default())?;
+//! let found = fit_scan(&map, Velocities::Means, &RetrievalOptions::default())?.result;
 //! assert!(found.has(Flag::NoWake) && (found.lateral_wind_m_s.value - 3.0).abs() < 0.1);
 //! # Ok::<(), wakescope_estimate::Error>(())
 //! ```
@@ -29,7 +31,9 @@
 mod aliases;
 mod alternatives;
 mod envelope;
+mod estimates;
 mod fit;
+mod gate_means;
 mod gates;
 mod hypotheses;
 mod options;
@@ -44,13 +48,12 @@ mod whitening;
 
 pub use crate::vortex_fit::Top;
 pub use envelope::{EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelopes};
-pub use fit::fit_scan;
+pub use fit::{ScanEstimator, ScanFit, Velocities, fit_scan};
 pub use gates::expected_velocities;
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use plausible::without_implausible_vortices;
 pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, ScanResult, Side, VortexResult};
 pub use scan_map::ScanMap;
-pub use secondary::with_secondary_vortices;
 pub use track::{Track, TrackPoint, TrackedVortex, track};
 pub(crate) use whitening::Whitening;

@@ -15,7 +15,7 @@ use crate::vortex_fit::{Parameter, Top, Wake};
 /// Velocities with larger residuals, in their deviations, are outliers.
 pub(crate) const OUTLIER: f64 = 4.0;
 /// A vortex whose circulation is less than so many of its deviations may be none.
-const LEAST_SIGMAS: f64 = 3.0;
+pub(crate) const CERTAIN_SIGMAS: f64 = 3.0;
 /// So many times the root of the threshold is far beyond doubt in correlated noise too.
 const BY_FAR: f64 = 2.0;
 /// A top so much above the least chi-square competes with it.
@@ -287,10 +287,10 @@ impl Uncertainty<'_> {
         };
         let alone =
             |group: &[usize]| group.contains(&circulation) || group[0] >= Parameter::Wind as usize;
-        Ok(beyond(self.covariance(|_| true)?, LEAST_SIGMAS)
+        Ok(beyond(self.covariance(|_| true)?, CERTAIN_SIGMAS)
             || beyond(
                 self.covariance(alone)?,
-                (BY_FAR * threshold.sqrt()).max(LEAST_SIGMAS),
+                (BY_FAR * threshold.sqrt()).max(CERTAIN_SIGMAS),
             ))
     }
 }

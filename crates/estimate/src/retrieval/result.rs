@@ -4,6 +4,7 @@ use ndarray::Array2;
 
 use crate::Measured;
 use crate::retrieval::ScanMap;
+use crate::retrieval::report::{CERTAIN_SIGMAS, COMPETES};
 use crate::vortex_fit::wake::motion::Motion;
 use crate::vortex_fit::{PARAMETERS, Parameter, Top, Wake, WakeModel};
 
@@ -72,6 +73,11 @@ impl VortexResult {
     #[must_use]
     pub fn place_m(&self) -> (f64, f64) {
         (self.lateral_position_m.value, self.height_m.value)
+    }
+
+    /// Whether the circulation is positive beyond doubt.
+    pub(crate) fn is_certain(&self) -> bool {
+        self.circulation_m2_s.value > CERTAIN_SIGMAS * self.circulation_m2_s.std
     }
 
     /// A vortex of a wake, given with its covariance \[10, 10\] for the middle of the scan, when the line through its core is measured.
@@ -236,5 +242,83 @@ impl ScanResult {
     #[must_use]
     pub fn vortex(&self, side: Side) -> Option<&VortexResult> {
         self.vortices.iter().find(|vortex| vortex.side == side)
+    }
+
+    /// The result of another fit that ends at a wake with that covariance \[10, 10\] and those minima: the vortices that it has, each when the line
+    /// of sight passes it.
+    #[must_use]
+    pub fn with_wake(
+        &self,
+        map: &ScanMap,
+        model: &WakeModel,
+        (wake, covariance): (Wake, Array2<f64>),
+        tops: Vec<Top>,
+        moves: bool,
+    ) -> Self {
+        let is_there = |side: &Side| wake.to_array()[side.parameters()[0] as usize] != 0.0;
+        let vortex =
+            |side| VortexResult::at_its_line(map, model, (&wake, &covariance), side, moves);
+        let mut result = Self {
+            vortices: Side::BOTH
+                .into_iter()
+                .filter(is_there)
+                .map(vortex)
+                .collect(),
+            wake: Some(wake),
+            lateral_wind_m_s: Measured::of_wake(Parameter::Wind, &wake, &covariance),
+            wind_shear_per_s: Measured::of_wake(Parameter::Shear, &wake, &covariance),
+            covariance,
+            tops,
+            ..self.clone()
+        };
+        if result.vortices.len() != self.vortices.len() {
+            // What the other fit left says nothing of this one.
+            result.set(Flag::PoorFit, false);
+            result.chi2_per_dof = f64::NAN;
+        }
+        result.set(Flag::NoWake, false);
+        result.set(Flag::Uncertain, false);
+        let is_instant = map.has_times() && map.lasts_s() == 0.0;
+        result.set(Flag::MotionIgnored, !moves && !is_instant);
+        result.set(Flag::NotConverged, false);
+        let competing = result
+            .tops
+            .iter()
+            .skip(1)
+            .any(|top| top.chi2 - result.tops[0].chi2 < COMPETES);
+        result.set(Flag::Ambiguous, competing);
+        result.reporting(|_| true)
+    }
+
+    /// The result with those of its vortices that are reported.
+    pub(crate) fn reporting(mut self, is_reported: impl Fn(&VortexResult) -> bool) -> Self {
+        self.vortices.retain(is_reported);
+        self.set(Flag::OneVortex, self.vortices.len() == 1);
+        let is_kept = |vortex: &VortexResult| vortex.core_radius_m.is_none();
+        self.set(Flag::CoreKept, self.vortices.iter().any(is_kept));
+        self
+    }
+
+    /// Counts the distance from another result as an error, in all numbers that are known.
+    pub(crate) fn add_distance_from(&mut self, other: &Self, map: &ScanMap, model: &WakeModel) {
+        let (Some(wake), Some(other)) = (self.wake, other.wake) else {
+            return;
+        };
+        let own = wake.to_array();
+        let other = other.to_array();
+        let variances = self.covariance.diag().to_owned();
+        let distance = |i: usize| {
+            if variances[i] > 0.0 {
+                own[i] - other[i]
+            } else {
+                0.0
+            }
+        };
+        let mut covariance = self.covariance.clone();
+        for ((i, j), c) in covariance.indexed_iter_mut() {
+            *c += distance(i) * distance(j);
+        }
+        let moves = !self.has(Flag::MotionIgnored);
+        *self = self.with_wake(map, model, (wake, covariance), self.tops.clone(), moves);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Check: impossible maps are refused with the field's name.
 
-use ndarray::Array2;
+use ndarray::{Array2, s};
 
 use crate::error::{Error, finite, length, positive};
 use crate::vortex_fit::map_fit::data::{BlockMedians, block_means, median};
@@ -99,6 +99,23 @@ impl ScanMap {
             sigma_m_s,
             fold_m_s,
         })
+    }
+
+    /// Every Nth line and gate of the map; a stride of 0 counts as 1.
+    #[must_use]
+    pub fn strided(&self, lines: usize, gates: usize) -> Self {
+        let lines = lines.max(1);
+        let gates = gates.max(1);
+        let axis = |all: &[f64], stride: usize| all.iter().copied().step_by(stride).collect();
+        let cells = |all: &Array2<f64>| all.slice(s![..;lines, ..;gates]).to_owned();
+        Self {
+            elevation_rad: axis(&self.elevation_rad, lines),
+            time_s: axis(&self.time_s, lines),
+            range_m: axis(&self.range_m, gates),
+            velocity_m_s: cells(&self.velocity_m_s),
+            sigma_m_s: self.sigma_m_s.as_ref().map(cells),
+            fold_m_s: self.fold_m_s,
+        }
     }
 
     /// Whether the lines have times.

@@ -5,23 +5,24 @@
 use ndarray::Array2;
 
 use crate::error::Error;
-use crate::retrieval::fit::MOST;
-use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, VortexResult, fit_scan};
+use crate::retrieval::fit::ScanFit;
+use crate::retrieval::gate_means::{MOST, fit_means};
+use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, VortexResult};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::{MapFitOptions, Parameter};
 
-/// What [`fit_scan`] finds with secondary vortices in the model, and the options with them, if the scan shows them beside the pair that it has
-/// `found` or [`RetrievalOptions::secondary`] wants them anyway; with [`Secondary::Never`](crate::vortex_fit::Secondary::Never) what was
-/// found, flagged. Looked for are those in velocities whose errors are independent. The deviations count what is not known of them.
+/// The fit with secondary vortices in the model, if the scan shows them beside the pair that was `found` or [`RetrievalOptions::secondary`] requests
+/// them; with [`Secondary::Never`](crate::vortex_fit::Secondary::Never) what was found, flagged. They are searched in velocities whose errors are
+/// independent. The standard errors contain what is not known of them.
 ///
 /// # Errors
-/// As [`fit_scan`].
-pub fn with_secondary_vortices(
+/// As [`fit_scan`](crate::retrieval::fit_scan).
+pub(super) fn with_secondary_vortices(
     map: &ScanMap,
     options: &RetrievalOptions,
     found: &ScanResult,
-) -> Result<Option<(ScanResult, RetrievalOptions)>, Error> {
+) -> Result<Option<ScanFit>, Error> {
     let is_pair = found.vortices.len() == 2;
     // the least chi-square, where other spacings share in what is told
     let Some(pair) = found
@@ -66,7 +67,10 @@ pub fn with_secondary_vortices(
     if !four.secondary.fitted {
         let mut result = found.clone();
         result.set(Flag::SecondaryVortices, true);
-        return Ok(Some((result, options.clone())));
+        return Ok(Some(ScanFit {
+            result,
+            model: options.model,
+        }));
     }
     // what another profile would do was free in the search
     let mut options = RetrievalOptions {
@@ -75,13 +79,16 @@ pub fn with_secondary_vortices(
     };
     options.model.secondary = Some(four.secondary.vortices);
     options.start = Some(four.wake);
-    let mut result = fit_scan(map, &options)?;
+    let mut result = fit_means(map, &options)?;
     if result.vortices.len() < 2 {
         return Ok(None);
     }
     result.set(Flag::SecondaryVortices, four.secondary.shown);
     widen(&mut result, map, &four.covariance, &options);
-    Ok(Some((result, options)))
+    Ok(Some(ScanFit {
+        result,
+        model: options.model,
+    }))
 }
 
 /// Deviations that are too small as the secondary vortices were kept become those of the fit of all.

@@ -173,7 +173,9 @@ impl Scatter {
                 velocity_m_s: draw(case, &mut rng),
                 ..case.map.clone()
             };
-            let found = fit_scan(&map, &case.options).unwrap();
+            let found = fit_scan(&map, Velocities::Means, &case.options)
+                .unwrap()
+                .result;
             if found.vortices.len() < 2 {
                 scatter.failed.push((seed, found));
                 continue;
@@ -388,9 +390,11 @@ pub(super) fn empty_statistics(
                 velocity_m_s,
                 ..case.map.clone()
             },
+            Velocities::Means,
             options,
         )
-        .unwrap();
+        .unwrap()
+        .result;
         if found.vortices.is_empty() {
             -found.statistic
         } else {
@@ -488,7 +492,9 @@ fn exact_scans_give_the_truth_to_a_thousandth_of_the_bound() {
     for name in ["a", "b", "c"] {
         let mut case = case(name);
         case.map.velocity_m_s = case.exact.clone();
-        let found = fit_scan(&case.map, &case.options).unwrap();
+        let found = fit_scan(&case.map, Velocities::Means, &case.options)
+            .unwrap()
+            .result;
         let errors = errors_over_bounds(&case, &found);
         assert!(errors.iter().all(|e| e.abs() < 1e-3), "{name}: {errors:?}");
     }
@@ -502,7 +508,9 @@ fn stored_scans_are_within_three_bounds_of_the_truth_whether_the_wake_moves_or_n
             movement: Movement::Auto,
             ..case.options.clone()
         };
-        let found = fit_scan(&case.map, &options).unwrap();
+        let found = fit_scan(&case.map, Velocities::Means, &options)
+            .unwrap()
+            .result;
         let errors = errors_over_bounds(&case, &found);
         assert!(errors.iter().all(|e| e.abs() < 3.0), "{name}: {errors:?}");
         assert!(
@@ -542,7 +550,9 @@ fn stored_scans_are_within_three_bounds_of_the_truth_whether_the_wake_moves_or_n
 fn a_frozen_model_of_a_moving_wake_is_metres_off_and_fits_badly() {
     let mut case = case("c");
     case.options.movement = Movement::Frozen;
-    let found = fit_scan(&case.map, &case.options).unwrap();
+    let found = fit_scan(&case.map, Velocities::Means, &case.options)
+        .unwrap()
+        .result;
     let wake = found.wake.unwrap();
     assert!(
         (wake.right.lateral_position_m - 424.0 + 2.6).abs() < 0.8,
@@ -561,12 +571,14 @@ fn one_vortex_is_told_as_one_and_wind_as_no_wake() {
     for movement in [Movement::Auto, Movement::Frozen] {
         let found = fit_scan(
             &map,
+            Velocities::Means,
             &RetrievalOptions {
                 movement,
                 ..Default::default()
             },
         )
-        .unwrap();
+        .unwrap()
+        .result;
         assert!(
             found.has(Flag::OneVortex) && found.vortices.len() == 1,
             "{:?}",
@@ -589,7 +601,9 @@ fn one_vortex_is_told_as_one_and_wind_as_no_wake() {
         }
     }
     let (map, _) = stored(reference!("map_noise"));
-    let found = fit_scan(&map, &RetrievalOptions::default()).unwrap();
+    let found = fit_scan(&map, Velocities::Means, &RetrievalOptions::default())
+        .unwrap()
+        .result;
     assert!(found.has(Flag::NoWake) && found.vortices.is_empty() && found.wake.is_none());
     assert!((found.lateral_wind_m_s.value + 3.0).abs() < 4.0 * found.lateral_wind_m_s.std);
     assert!((found.wind_shear_per_s.value - 0.04).abs() < 4.0 * found.wind_shear_per_s.std);
@@ -615,7 +629,9 @@ fn outliers_and_unknown_deviations_leave_errors_that_the_covariance_tells() {
                 sigma_m_s,
                 ..case.map.clone()
             };
-            let found = fit_scan(&map, &case.options).unwrap();
+            let found = fit_scan(&map, Velocities::Means, &case.options)
+                .unwrap()
+                .result;
             let (p, truth) = (found.wake.unwrap().to_array(), case.truth.to_array());
             squares.extend(
                 (0..PARAMETERS).map(|i| (p[i] - truth[i]).powi(2) / found.covariance[[i, i]]),
@@ -770,7 +786,13 @@ fn weak_unequal_low_and_high_wakes_on_coarse_and_narrow_scans_are_within_their_e
             gates,
         ),
     ] {
-        let found = fit_scan(&noisy(&wake, options, lines, gates, 17), options).unwrap();
+        let found = fit_scan(
+            &noisy(&wake, options, lines, gates, 17),
+            Velocities::Means,
+            options,
+        )
+        .unwrap()
+        .result;
         let (p, truth) = (found.wake.unwrap().to_array(), wake.to_array());
         for i in 0..PARAMETERS {
             let sigma = found.covariance[[i, i]].sqrt();
@@ -798,7 +820,13 @@ fn vortices_beyond_or_at_the_end_of_the_sector_are_told() {
     };
     let (lines, gates) = ((0.004, 0.004, 56), (330.0, 4.0, 31));
     // 450 m is the last gate
-    let found = fit_scan(&noisy(&wake(475.0), &options, lines, gates, 1), &options).unwrap();
+    let found = fit_scan(
+        &noisy(&wake(475.0), &options, lines, gates, 1),
+        Velocities::Means,
+        &options,
+    )
+    .unwrap()
+    .result;
     assert!(
         found.has(Flag::OneVortex) && found.vortex(Side::Right).is_none(),
         "{:?}",
@@ -809,7 +837,13 @@ fn vortices_beyond_or_at_the_end_of_the_sector_are_told() {
         (left[0].value - 380.0).abs() < 25.0 && (left[1].value - 400.0).abs() < 1.0,
         "{left:?}"
     );
-    let found = fit_scan(&noisy(&wake(444.0), &options, lines, gates, 2), &options).unwrap();
+    let found = fit_scan(
+        &noisy(&wake(444.0), &options, lines, gates, 2),
+        Velocities::Means,
+        &options,
+    )
+    .unwrap()
+    .result;
     assert!(
         found.has(Flag::AtEdge) && found.vortices.len() == 2,
         "{:?}",
@@ -830,7 +864,7 @@ fn folded_velocities_holes_and_cores_that_are_kept() {
     map.velocity_m_s
         .slice_mut(ndarray::s![20..24, 3..9])
         .fill(f64::NAN);
-    let found = fit_scan(&map, &options).unwrap();
+    let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
     let (p, truth) = (found.wake.unwrap().to_array(), wake.to_array());
     assert!(
         (0..PARAMETERS).all(|i| (p[i] - truth[i]).powi(2) <= 16.0 * found.covariance[[i, i]]),
@@ -843,13 +877,15 @@ fn folded_velocities_holes_and_cores_that_are_kept() {
     };
     let kept = fit_scan(
         &map,
+        Velocities::Means,
         &RetrievalOptions {
             free: fixed,
             core_radius_m: Some(2.2),
             ..options
         },
     )
-    .unwrap();
+    .unwrap()
+    .result;
     assert!(kept.has(Flag::CoreKept) && kept.vortices.iter().all(|v| v.core_radius_m.is_none()));
     assert_eq!(kept.wake.unwrap().left.core_radius_m, 2.2);
 }
@@ -858,7 +894,9 @@ fn folded_velocities_holes_and_cores_that_are_kept() {
 fn impossible_scans_and_options_are_refused_with_the_field() {
     let (map, _) = stored(reference!("map_noise"));
     let refused = |map: &ScanMap, options: &RetrievalOptions, field: &str| {
-        let error = fit_scan(map, options).unwrap_err().to_string();
+        let error = fit_scan(map, Velocities::Means, options)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains(field), "{error}");
     };
     let options = RetrievalOptions::default();
@@ -925,7 +963,7 @@ fn impossible_scans_and_options_are_refused_with_the_field() {
         "deviation_m_s",
     );
     assert_eq!(
-        fit_scan(&map, &options).unwrap(),
-        fit_scan(&map, &options).unwrap()
+        fit_scan(&map, Velocities::Means, &options).unwrap().result,
+        fit_scan(&map, Velocities::Means, &options).unwrap().result
     );
 }

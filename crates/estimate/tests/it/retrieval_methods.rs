@@ -96,7 +96,13 @@ fn radial_velocities_have_the_errors_of_the_stored_table() {
             (found[1].clone(), with, 0.7),
         ];
         if z == 1.0 {
-            cases.push((fit_scan(&map, &options(false)).unwrap(), [1.1, 5.6], 2.0));
+            cases.push((
+                fit_scan(&map, Velocities::Means, &options(false))
+                    .unwrap()
+                    .result,
+                [1.1, 5.6],
+                2.0,
+            ));
         }
         for (found, stored, allowed) in &cases {
             let away = errors(found)

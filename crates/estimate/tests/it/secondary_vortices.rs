@@ -81,6 +81,11 @@ fn fits_near_the_ground(
     })
 }
 
+/// The fit of a scan of means.
+fn fit_of(map: &ScanMap, options: &RetrievalOptions) -> ScanFit {
+    fit_scan(map, Velocities::Means, options).unwrap()
+}
+
 /// Vortices of which the ground has driven the left and the right one apart.
 fn grounded() -> Wake {
     Wake::from_array(&[450.0, 430.0, 345.0, 38.0, 440.0, 42.0, 3.5, 3.5, 0.5, 0.0])
@@ -193,18 +198,12 @@ fn secondary_vortices_are_fitted_never_or_always_and_told_where_the_map_shows_th
         secondary,
         ..case.options.clone()
     };
-    let pair = fit_scan(&case.map, &case.options).unwrap();
+    let never = fit_of(&case.map, &options(Secondary::Never));
+    assert!(never.model.secondary.is_none() && !never.result.has(Flag::SecondaryVortices));
+    let always = fit_of(&case.map, &options(Secondary::Always));
     assert!(
-        with_secondary_vortices(&case.map, &options(Secondary::Never), &pair)
-            .unwrap()
-            .is_none()
-    );
-    let (four, with) = with_secondary_vortices(&case.map, &options(Secondary::Always), &pair)
-        .unwrap()
-        .unwrap();
-    assert!(
-        with.model.secondary.is_some() && !four.has(Flag::SecondaryVortices),
-        "{four:?}"
+        always.model.secondary.is_some() && !always.result.has(Flag::SecondaryVortices),
+        "{always:?}"
     );
 }
 
@@ -219,11 +218,8 @@ fn cores_of_secondary_vortices_are_fitted() {
     air.model.secondary = Some([left, right]);
     case.map.velocity_m_s = expected_velocities(&case.map, &air, &grounded(), false).unwrap();
     case.map.sigma_m_s = Some(case.map.velocity_m_s.mapv(|_| 0.05));
-    let pair = fit_scan(&case.map, &case.options).unwrap();
-    let (_, with) = with_secondary_vortices(&case.map, &case.options, &pair)
-        .unwrap()
-        .unwrap();
-    for (found, truth) in with.model.secondary.unwrap().iter().zip([left, right]) {
+    let four = fit_of(&case.map, &case.options);
+    for (found, truth) in four.model.secondary.unwrap().iter().zip([left, right]) {
         assert!(
             (found.core_radius_m / truth.core_radius_m - 1.0).abs() < 0.1,
             "{found:?}"
@@ -273,14 +269,14 @@ fn secondary_vortices_are_found_in_scans_of_any_instrument_that_show_them() {
             velocity_m_s,
             ..case.map.clone()
         };
-        let pair = fit_scan(&map, &options).unwrap();
-        let four = with_secondary_vortices(&map, &options, &pair).unwrap();
-        assert_eq!(four.is_some(), shown.is_some(), "{seed}");
-        let Some((four, options)) = four else {
+        let four = fit_of(&map, &options);
+        assert_eq!(four.model.secondary.is_some(), shown.is_some(), "{seed}");
+        let Some(secondary) = four.model.secondary else {
             continue;
         };
+        let four = four.result;
         assert!(four.has(Flag::SecondaryVortices));
-        for (found, of) in options.model.secondary.unwrap().iter().zip(near_ground) {
+        for (found, of) in secondary.iter().zip(near_ground) {
             let away_m = (found.lateral_position_m - of.lateral_position_m)
                 .hypot(found.height_m - of.height_m);
             assert!(
@@ -296,7 +292,13 @@ fn secondary_vortices_are_found_in_scans_of_any_instrument_that_show_them() {
             };
             (0..6).map(of).fold(0.0, f64::max)
         };
-        let (missed, left) = (away(&pair.wake.unwrap().to_array()), away(&wake));
+        let without = RetrievalOptions {
+            secondary: Secondary::Never,
+            ..options
+        };
+        let pair = fit_of(&map, &without).result.wake.unwrap();
+        let missed = away(&pair.to_array());
+        let left = away(&wake);
         assert!(left < 3.5 && missed > 2.0 * left, "{missed} {left}");
         let vortex = four.vortex(Side::Left).unwrap();
         assert_eq!(vortex.circulation_m2_s.std, four.covariance[[0, 0]].sqrt());
@@ -315,13 +317,8 @@ fn cores_of_another_profile_are_no_secondary_vortices() {
         let mut air = options.clone();
         air.model.profile = CoreProfile::LambOseen;
         let map = map_of(&air, &truth, 0.15, 0.0, seed);
-        let pair = fit_scan(&map, &options).unwrap();
-        assert!(
-            with_secondary_vortices(&map, &options, &pair)
-                .unwrap()
-                .is_none(),
-            "{core_m}"
-        );
+        let found = fit_of(&map, &options);
+        assert!(!found.result.has(Flag::SecondaryVortices), "{core_m}");
     }
 }
 
@@ -381,13 +378,8 @@ fn a_pair_alone_that_moves_has_no_secondary_vortices() {
         ]);
         let options = of_gates(10.0);
         let map = map_of(&options, &truth, 0.5, 6.0, seed);
-        let pair = fit_scan(&map, &options).unwrap();
-        assert!(
-            with_secondary_vortices(&map, &options, &pair)
-                .unwrap()
-                .is_none(),
-            "{seed}"
-        );
+        let found = fit_of(&map, &options);
+        assert!(!found.result.has(Flag::SecondaryVortices), "{seed}");
     }
 }
 
@@ -396,13 +388,8 @@ fn a_pair_alone_that_moves_has_no_secondary_vortices() {
 fn stored_scans_show_no_secondary_vortices() {
     for name in ["a", "b"] {
         let case = case(name);
-        let pair = fit_scan(&case.map, &case.options).unwrap();
-        assert!(
-            with_secondary_vortices(&case.map, &case.options, &pair)
-                .unwrap()
-                .is_none(),
-            "{name}"
-        );
+        let found = fit_of(&case.map, &case.options);
+        assert!(!found.result.has(Flag::SecondaryVortices), "{name}");
     }
 }
 
@@ -435,12 +422,10 @@ fn scans_with_outliers_or_turbulence_show_no_secondary_vortices() {
                 velocity_m_s,
                 ..case.map.clone()
             };
-            let pair = fit_scan(&map, &case.options).unwrap();
-            found += usize::from(
-                with_secondary_vortices(&map, &case.options, &pair)
-                    .unwrap()
-                    .is_some(),
-            );
+            let shows_secondary = fit_of(&map, &case.options)
+                .result
+                .has(Flag::SecondaryVortices);
+            found += usize::from(shows_secondary);
         }
         println!("turbulence {deviation_m_s} m/s: secondary vortices in {found} of 60");
         assert!(found <= 3, "{found}");

@@ -344,7 +344,7 @@ fn one_vortex_alone_is_fitted_with_its_core() {
     map.velocity_m_s = expected_velocities(&map, &options, &truth, false).unwrap();
     map.velocity_m_s
         .mapv_inplace(|v| v + 0.2 * crate::fixtures::normal(&mut rng));
-    let found = fit_scan(&map, &options).unwrap();
+    let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
     let [vortex] = &found.vortices[..] else {
         panic!("{found:?}")
     };

@@ -7,7 +7,7 @@ use super::options::WITHOUT_SCANS;
 use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test,
-    scan_table, share_table, strided,
+    scan_table, share_table,
 };
 use crate::io::Provenance;
 use crate::io::csv::digits;
@@ -111,7 +111,7 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
         })?;
     if let Some(empty) = empty {
         calibration = Some(Calibration::new(
-            &strided(&empty, settings.stride),
+            &empty.strided(settings.stride.0, settings.stride.1),
             &settings,
             &*observer,
         )?);

@@ -14,15 +14,15 @@ use crate::io::scans::{ReadScan, are_of_one_plane, face_alike, plane_numbers, sh
 use crate::outputs::Outputs;
 use crate::plan::Stage;
 use crate::progress::{Observer, Silent};
-use crate::retrieve::{
-    self, Method, PlaneTrack, RetrievedScan, SceneResponse, Velocities, gate_of,
-};
+use crate::retrieve::{self, Method, PlaneTrack, RetrievedScan, SceneResponse, gate_of};
 use crate::scene::{Estimator, SceneFile};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use wakescope_estimate::retrieval::{EnvelopeResult, Flag, Gate, Movement, RetrievalOptions};
+use wakescope_estimate::retrieval::{
+    EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Velocities,
+};
 use wakescope_estimate::vortex_fit::{CoreProfile, Secondary, Wake};
 
 /// Arguments of `wakescope retrieve`.
@@ -116,7 +116,7 @@ impl RetrieveArgs {
             _ if self.motion != Movement::Auto && !scan.map.has_times() => {
                 ("motion", "its lines have no times")
             }
-            Velocities::Shown(_) if has_turbulence => (
+            Velocities::Estimates(_) if has_turbulence => (
                 "turbulence",
                 "what the estimator shows of a wake is fitted with independent errors; those of means may be shared",
             ),
@@ -382,8 +382,8 @@ fn of_map(
         .transpose()?
         .flatten();
     let velocities = match &own {
-        Some(own) if is_likely => Velocities::LikelyShown(own),
-        Some(own) => Velocities::Shown(own),
+        Some(own) if is_likely => Velocities::LikelyEstimates(own),
+        Some(own) => Velocities::Estimates(own),
         None if are_means => Velocities::Means,
         None => Velocities::Unknown,
     };
@@ -424,7 +424,9 @@ fn of_signals(
         spectra,
     } = signals;
     let own = SceneResponse::of_scene(&plan.file, &Silent)?;
-    let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
+    let velocities = own
+        .as_ref()
+        .map_or(Velocities::Unknown, |own| Velocities::Estimates(own));
     let mut first_line = 0;
     for (mut scan, measured) in maps.into_iter().zip(&scans) {
         scan.azimuth_rad = Some(plan.scene().scan.azimuth_rad);

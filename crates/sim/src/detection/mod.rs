@@ -20,7 +20,6 @@ pub use tables::{scan_table, share_table};
 use crate::Error;
 use crate::progress::{Observer, Stage};
 use crate::streams::stream;
-use ndarray::s;
 use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
 use wakescope_estimate::vortex_fit::WakeModel;
@@ -342,25 +341,9 @@ pub fn detect(
 /// gates are left out.
 fn cleaned(scan: &ScanMap, settings: &DetectionSettings) -> (ScanMap, usize, usize) {
     let (map, outliers) = without_spikes(scan, settings.options.turbulence.as_ref());
-    let map = strided(&map, settings.stride);
+    let map = map.strided(settings.stride.0, settings.stride.1);
     let velocities = map.velocity_m_s.iter().filter(|v| v.is_finite()).count();
     (map, outliers, velocities)
-}
-
-/// Every so many lines and gates of a map.
-#[must_use]
-pub fn strided(map: &ScanMap, (lines, gates): (usize, usize)) -> ScanMap {
-    let (lines, gates) = (lines.max(1), gates.max(1));
-    let some = |axis: &[f64], by: usize| axis.iter().copied().step_by(by).collect();
-    let cells = |values: &ndarray::Array2<f64>| values.slice(s![..;lines, ..;gates]).to_owned();
-    ScanMap {
-        elevation_rad: some(&map.elevation_rad, lines),
-        time_s: some(&map.time_s, lines),
-        range_m: some(&map.range_m, gates),
-        velocity_m_s: cells(&map.velocity_m_s),
-        sigma_m_s: map.sigma_m_s.as_ref().map(cells),
-        fold_m_s: map.fold_m_s,
-    }
 }
 
 /// The background that the rate of false alarms holds for, in words.
@@ -496,7 +479,7 @@ mod tests {
         let from = smooth.velocity_m_s.clone();
         for ((line, gate), v) in smooth.velocity_m_s.indexed_iter_mut() {
             let last = (line + 3).min(44);
-            *v = from.slice(s![line..last, gate]).mean().unwrap() * 3f64.sqrt();
+            *v = from.slice(ndarray::s![line..last, gate]).mean().unwrap() * 3f64.sqrt();
         }
         let (found, _) = detect(std::slice::from_ref(&smooth), &settings(), &Silent).unwrap();
         assert!(found[0].is_correlated(), "{found:?}");

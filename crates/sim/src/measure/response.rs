@@ -12,6 +12,7 @@ use crate::progress::Observer;
 use crate::scene::{Scene, SceneFile};
 use wakescope_estimate::Radius;
 use wakescope_estimate::bound::Noise;
+use wakescope_estimate::retrieval::ScanEstimator;
 use wakescope_estimate::vortex_fit::{EstimatorResponse, PulseShape, ScanSetup, WakeModel};
 
 /// Pulse, noise and signal-to-noise ratio of a scene's signals, and the estimator of its maps.
@@ -73,43 +74,9 @@ impl SceneResponse {
         nearest.map_or(0.0, |(_, snr)| *snr)
     }
 
-    /// What the estimator shows of a wake about a range; nothing for complex signals.
-    pub(crate) fn shown(&self, range_m: f64) -> Option<EstimatorResponse<'_>> {
-        let (correlogram, estimator) = self.response.as_ref()?;
-        let noise = (self.noise, self.snr_at(range_m));
-        let sampling = self.scene.sampling().ok()?;
-        let of_lines = EstimatorResponse::new(
-            correlogram,
-            &**estimator,
-            &sampling,
-            &self.pulse,
-            noise,
-            0.0,
-        )
-        .ok()?;
-        Some(of_lines.with_radius(|range_m| self.radius_m(range_m)))
-    }
-
     /// Radius of the regions of the maps at a range, m.
     fn radius_m(&self, range_m: f64) -> f64 {
         self.radius.at_m(range_m).unwrap_or(0.0)
-    }
-
-    /// Neighbouring lines, `step_rad` apart, that share windows at a range, m.
-    pub(crate) fn correlated_lines(&self, step_rad: f64, range_m: f64) -> usize {
-        (2.0 * self.radius_m(range_m) / (step_rad * range_m)) as usize
-    }
-
-    /// Every so-manyth gate of a map says something of its own: neighbours that share most of their window say the same.
-    pub(crate) fn gate_step(&self, range_m: &[f64]) -> usize {
-        let period_s = 1.0 / self.scene.detector.sampling_hz;
-        let apart_m = 0.25
-            * self.scene.estimator.window_samples as f64
-            * 0.5
-            * crate::SPEED_OF_LIGHT_M_S
-            * period_s;
-        // files round their ranges
-        ((apart_m / spacing_m(range_m) - 1e-3).ceil() as usize).max(1)
     }
 
     /// How the records of lines at elevations, rad, were taken.
@@ -132,8 +99,46 @@ impl SceneResponse {
     }
 }
 
+impl ScanEstimator for SceneResponse {
+    /// Nothing for complex signals.
+    fn response(&self, range_m: f64) -> Option<EstimatorResponse<'_>> {
+        let (correlogram, estimator) = self.response.as_ref()?;
+        let noise = (self.noise, self.snr_at(range_m));
+        let sampling = self.scene.sampling().ok()?;
+        let of_lines = EstimatorResponse::new(
+            correlogram,
+            &**estimator,
+            &sampling,
+            &self.pulse,
+            noise,
+            0.0,
+        )
+        .ok()?;
+        Some(of_lines.with_radius(|range_m| self.radius_m(range_m)))
+    }
+
+    fn correlated_lines(&self, spacing_rad: f64, range_m: f64) -> usize {
+        (2.0 * self.radius_m(range_m) / (spacing_rad * range_m)) as usize
+    }
+
+    fn gate_stride(&self, range_m: &[f64]) -> usize {
+        let period_s = 1.0 / self.scene.detector.sampling_hz;
+        let apart_m = 0.25
+            * self.scene.estimator.window_samples as f64
+            * 0.5
+            * crate::SPEED_OF_LIGHT_M_S
+            * period_s;
+        // files round their ranges
+        ((apart_m / spacing_m(range_m) - 1e-3).ceil() as usize).max(1)
+    }
+
+    fn half_window_m(&self) -> f64 {
+        0.5 * self.scene.estimator.window_samples as f64 * self.scene.sample_spacing_m()
+    }
+}
+
 /// Mean distance of ranges, m.
-pub(crate) fn spacing_m(range_m: &[f64]) -> f64 {
+fn spacing_m(range_m: &[f64]) -> f64 {
     let length_m = range_m.last().copied().unwrap_or(0.0) - range_m.first().copied().unwrap_or(0.0);
     length_m / (range_m.len().max(2) - 1) as f64
 }
@@ -159,7 +164,7 @@ mod tests {
             let wake =
                 Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.5, 2.5, 1.3, 0.0]);
             let lines: Vec<f64> = (0..20).map(|line| 0.1 + 2.5e-3 * f64::from(line)).collect();
-            let shown = response.shown(400.0).unwrap();
+            let shown = response.response(400.0).unwrap();
             let map = shown
                 .map(&WakeModel::default(), &wake, &lines, &[376.5, 423.5])
                 .unwrap();

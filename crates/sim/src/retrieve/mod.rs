@@ -2,7 +2,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `own` | maps and signals of a scene that is known: what its estimator makes of a wake |
+//! | `own` | signals of a scene that is known, and their maps |
 //! | `one_scan` | one map, and what a velocity of it is of the air about its range |
 //! | `envelope` | velocity envelopes |
 //! | `realisations`, `truth`, `summary` | all realisations of a scene against the vortices of its flow |
@@ -23,7 +23,7 @@ mod table;
 mod truth;
 
 pub use envelope::{envelope_table, envelopes};
-pub use one_scan::{Velocities, gate_of, options, retrieve_map, scene_of};
+pub use one_scan::{gate_of, options, retrieve_map, scene_of};
 
 pub use own::{retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]

@@ -3,12 +3,12 @@
 //! Check: bias and scatter of a pair; a method that fails is counted; the test for a wake keeps its rate.
 
 use super::envelope::envelopes;
-use super::one_scan::{Velocities, gate_of, options, retrieve_map};
+use super::one_scan::{gate_of, options, retrieve_map};
 use super::own::scan_of_lines;
 use super::table::{RetrievedScan, flags};
 use super::truth::{true_vortices, true_wake};
 use crate::Error;
-use crate::detection::{Calibration, DetectionSettings, SceneNoise, strided};
+use crate::detection::{Calibration, DetectionSettings, SceneNoise};
 use crate::measure::recorded::{spectra_of_samples, upward};
 use crate::measure::response::SceneResponse;
 use crate::measure::scan::Scanner;
@@ -16,7 +16,7 @@ use crate::plan::{Plan, Stage};
 use crate::progress::{Observer, Silent};
 use crate::scene::{FollowingAircraft, RetrievalMethod as Method, Scene};
 use ndarray::{Array2, ArrayView2};
-use wakescope_estimate::retrieval::{Flag, RetrievalOptions, ScanMap, VortexResult};
+use wakescope_estimate::retrieval::{Flag, RetrievalOptions, ScanMap, Velocities, VortexResult};
 use wakescope_estimate::vortex_fit::{CoreProfile, Follower, Wake, WakeModel};
 use wakescope_estimate::window::Sample;
 
@@ -73,7 +73,9 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
         .map(|lines| true_vortices(plan, lines))
         .collect::<Result<Vec<_>, _>>()?;
     let own = SceneResponse::new(plan, scanner.layer_snr())?;
-    let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
+    let velocities = own
+        .as_ref()
+        .map_or(Velocities::Unknown, |own| Velocities::Estimates(own));
     let options = options(
         Some(scene),
         gate_of(None, None, Some(scene))?.0,
@@ -309,7 +311,11 @@ fn tests(
         ..DetectionSettings::default()
     };
     let empty = noise.empty_scan(plan);
-    let calibration = Calibration::new(&strided(&empty, settings.stride), &settings, observer)?;
+    let calibration = Calibration::new(
+        &empty.strided(settings.stride.0, settings.stride.1),
+        &settings,
+        observer,
+    )?;
     let test = |map: &Array2<f64>| {
         let found = calibration.of_scan(
             &ScanMap {

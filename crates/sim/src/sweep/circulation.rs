@@ -10,6 +10,7 @@ use crate::plan::wind::vortex_pair;
 use crate::scene::{Flow, VortexPair};
 use ndarray::{Array2, s};
 use wakescope_estimate::map::ErrorStatistics;
+use wakescope_estimate::retrieval::ScanEstimator;
 use wakescope_estimate::vortex_fit::{
     FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex,
     Wake, WakeModel, fit_map_of_estimator,
@@ -63,9 +64,9 @@ impl<'p> Retrieval<'p> {
 
     /// The circulation that the velocities of a map, m/s, have; NaN where the fit came to no end, nothing where none can be tried.
     pub(crate) fn circulation_m2_s(&self, velocity_m_s: &Array2<f64>) -> Option<f64> {
-        let shown = self.response.shown(self.pair.lateral_position_m)?;
+        let shown = self.response.response(self.pair.lateral_position_m)?;
         let (scene, g) = (self.plan.scene(), &self.plan.geometry);
-        let step = self.response.gate_step(&g.gate_range_m);
+        let step = self.response.gate_stride(&g.gate_range_m);
         let range_m: Vec<f64> = g.gate_range_m.iter().copied().step_by(step).collect();
         let map = VelocityMap {
             elevation_rad: &g.elevation_rad,
