@@ -5,6 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use ndarray::Array2;
 use num_complex::Complex;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -12,8 +13,8 @@ use wakescope_signal::literal::literal_envelope;
 use wakescope_signal::sampled::SampledPulse;
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
-    Error, GaussianPulse, LineOfSight, NoiseModel, Pulse, Receiver, Record, SPEED_OF_LIGHT_M_S,
-    Scan, Scratch, Shot, Simulator,
+    AccumulatedProducts, Error, GaussianPulse, LineOfSight, NoiseModel, Pulse, Receiver, Record,
+    SPEED_OF_LIGHT_M_S, Scan, Scratch, Shot, Simulator,
 };
 
 const SAMPLES: usize = 1000;
@@ -33,7 +34,11 @@ fn chirped() -> Result<Pulse, Error> {
     Ok(SampledPulse::new(&times, &amplitude, gaussian.energy_j())?.into())
 }
 
-fn simulator(noise: NoiseModel, pulse: impl Into<Pulse>) -> Result<Simulator, Error> {
+fn simulator(
+    noise: NoiseModel,
+    pulse: impl Into<Pulse>,
+    samples: usize,
+) -> Result<Simulator, Error> {
     let receiver = Receiver {
         noise,
         ..Receiver::table2()
@@ -43,7 +48,7 @@ fn simulator(noise: NoiseModel, pulse: impl Into<Pulse>) -> Result<Simulator, Er
         receiver,
         Record {
             time_of_first_sample_s: 1.0e-6,
-            samples: SAMPLES,
+            samples,
         },
     )
 }
@@ -68,9 +73,10 @@ fn heterodyne(criterion: &mut Criterion) {
     let mut scratch = Scratch::default();
     let mut current_a = vec![0.0; SAMPLES];
     let mut envelope_a = vec![Complex::ZERO; SAMPLES];
-    let bare = simulator(NoiseModel::None, GaussianPulse::table2()).expect("valid settings");
-    let noisy =
-        simulator(NoiseModel::BandLimited, GaussianPulse::table2()).expect("valid settings");
+    let bare =
+        simulator(NoiseModel::None, GaussianPulse::table2(), SAMPLES).expect("valid settings");
+    let noisy = simulator(NoiseModel::BandLimited, GaussianPulse::table2(), SAMPLES)
+        .expect("valid settings");
     for parts in [1, 3, 6] {
         let line = line(parts);
         let speckle = vec![Complex::new(0.6, -0.8); line.layers()];
@@ -90,7 +96,7 @@ fn heterodyne(criterion: &mut Criterion) {
     let line = line(1);
     let speckle = vec![Complex::new(0.6, -0.8); line.layers()];
     let chirped = chirped()
-        .and_then(|pulse| simulator(NoiseModel::None, pulse))
+        .and_then(|pulse| simulator(NoiseModel::None, pulse, SAMPLES))
         .expect("valid settings");
     group.bench_function("envelope of a chirped pulse, 225 scatterers", |bench| {
         bench.iter(|| {
@@ -128,8 +134,8 @@ fn scan(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("scan");
     group.throughput(Throughput::Elements((LINES * SAMPLES) as u64));
     group.sample_size(10);
-    let noisy =
-        simulator(NoiseModel::BandLimited, GaussianPulse::table2()).expect("valid settings");
+    let noisy = simulator(NoiseModel::BandLimited, GaussianPulse::table2(), SAMPLES)
+        .expect("valid settings");
     for parts in [1, 3] {
         let lines = vec![line(parts); LINES];
         let scan = Scan {
@@ -158,5 +164,26 @@ fn scan(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, heterodyne, scan);
+/// The products of 4000 pulses of 401 samples up to the lag 63, and what is prepared once a line.
+fn products(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("accumulated products");
+    group.sample_size(20);
+    let samples = 401;
+    for noise in [NoiseModel::BandLimited, NoiseModel::White] {
+        let simulator = simulator(noise, GaussianPulse::table2(), samples).expect("valid settings");
+        let line = line(1);
+        group.bench_function(format!("prepare a line, {noise:?}"), |bench| {
+            bench.iter(|| AccumulatedProducts::<f64>::new(&simulator, &line));
+        });
+        let products = AccumulatedProducts::<f64>::new(&simulator, &line).expect("a covariance");
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+        let mut drawn_a2 = Array2::zeros((samples, 64));
+        group.bench_function(format!("draw a line, {noise:?}"), |bench| {
+            bench.iter(|| products.draw_into(4000, &mut rng, &mut drawn_a2));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, heterodyne, scan, products);
 criterion_main!(benches);

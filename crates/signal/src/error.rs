@@ -51,6 +51,12 @@ pub enum Error {
         /// Index of its first element that overflows.
         index: usize,
     },
+    /// The covariance of the samples of a record cannot be that of any signal.
+    #[error("the covariance of the record is not positive definite at sample {sample}")]
+    NotPositiveDefinite {
+        /// Index of a sample whose variance, given others, is negative.
+        sample: usize,
+    },
     /// The detector band does not fit between zero and half the sampling rate.
     #[error(
         "the detector band {low_hz:?} to {high_hz:?} Hz (intermediate_frequency_hz -+ bandwidth_hz/2) \

@@ -138,6 +138,11 @@ impl Simulator {
         &self.record
     }
 
+    /// Carrier and noise of the samples.
+    pub(crate) fn detector(&self) -> &Detector {
+        &self.detector
+    }
+
     /// Time of sample `k` \[s\].
     pub fn time_s(&self, k: usize) -> f64 {
         self.record.time_of_first_sample_s + k as f64 / self.receiver.sample_rate_hz

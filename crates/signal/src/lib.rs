@@ -45,6 +45,7 @@
 //! | [`literal`] | the same sum term by term, as oracle |
 //! | `noise` | band-limited or white shot noise, real or complex |
 //! | `expected` | mean power, (14), and covariance of the samples, without random numbers |
+//! | `accumulated` | [`AccumulatedProducts`]: products of samples summed over many records, drawn at once |
 //! | [`digitise`] | [`Digitiser`](digitise::Digitiser): rounding and saturation |
 //! | [`scan`] | [`Scan`]: all pulses of a scan, in parallel and in bounded memory |
 //! | `parallel` | loops on the caller's thread pool |
@@ -55,6 +56,7 @@
 
 #![warn(clippy::too_many_lines, clippy::type_complexity)]
 
+mod accumulated;
 pub mod constants;
 pub mod digitise;
 pub mod efficiency;
@@ -80,6 +82,7 @@ mod shot;
 mod table;
 mod window;
 
+pub use accumulated::AccumulatedProducts;
 pub use constants::SPEED_OF_LIGHT_M_S;
 pub use error::Error;
 pub use filter::RangeFilter;

@@ -7,6 +7,7 @@
 //!
 //! Check: variance (13); nothing outside the band; flat inside.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use num_complex::Complex;
@@ -90,7 +91,50 @@ impl<T: ?Sized> Noise<T> {
     }
 }
 
+impl<T: ?Sized> Noise<T> {
+    /// Covariance of samples `lag` apart, for each lag below `lags`; it is real for both kinds of
+    /// noise. `length` is that of the transform; `white` and `edge` are the factors of `sd_a^2` in
+    /// the variance of white noise and at zero frequency, which has no mirror.
+    fn covariance_with(
+        &self,
+        lags: usize,
+        length: fn(&T) -> usize,
+        white: f64,
+        edge: f64,
+    ) -> Vec<f64> {
+        let mut covariance_a2 = vec![0.0; lags];
+        match self {
+            Self::None => {}
+            Self::White { sd_a } => {
+                if let Some(variance_a2) = covariance_a2.first_mut() {
+                    *variance_a2 = white * sd_a * sd_a;
+                }
+            }
+            Self::Band {
+                transform,
+                first,
+                sd_a,
+            } => {
+                let length = length(transform);
+                for (lag, sum_a2) in covariance_a2.iter_mut().enumerate() {
+                    for (cell, sd_a) in (*first..).zip(sd_a) {
+                        let factor = if cell == 0 { edge } else { 4.0 };
+                        let turns = (cell * lag % length) as f64 / length as f64;
+                        *sum_a2 += factor * sd_a * sd_a * (2.0 * PI * turns).cos();
+                    }
+                }
+            }
+        }
+        covariance_a2
+    }
+}
+
 impl RealNoise {
+    /// Covariance of samples at each lag below `lags` \[A^2\].
+    pub(crate) fn covariance_a2(&self, lags: usize) -> Vec<f64> {
+        self.covariance_with(lags, |transform| transform.len(), 1.0, 4.0)
+    }
+
     /// A frequency and its mirror give 2 Re{X}: variance 4 sd^2.
     pub(crate) fn new(receiver: &Receiver, samples: usize) -> Self {
         Self::planned(
@@ -155,6 +199,11 @@ impl RealNoise {
 }
 
 impl BasebandNoise {
+    /// Covariance of samples at each lag below `lags` \[A^2\].
+    pub(crate) fn covariance_a2(&self, lags: usize) -> Vec<f64> {
+        self.covariance_with(lags, |transform| transform.len(), 2.0, 2.0)
+    }
+
     /// A complex envelope has its power on both sides of zero, with the one-sided density of
     /// the real noise.
     pub(crate) fn new(receiver: &Receiver, samples: usize) -> Self {

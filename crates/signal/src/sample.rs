@@ -23,13 +23,19 @@ impl Sample for f64 {}
 impl Sample for Complex<f64> {}
 
 pub(crate) mod sealed {
-    use std::f64::consts::SQRT_2;
+    use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
-    use rand::Rng;
+    use rand::{Rng, RngExt};
+
+    use ndarray::LinalgScalar;
+    use num_complex::ComplexFloat;
+    use rand_distr::{Distribution, Gamma, StandardNormal};
 
     use super::{Complex, Detector, Error, NoiseScratch, Receiver};
 
-    pub trait Received: Copy + Default + Send + Sync {
+    pub trait Received:
+        Copy + Default + Send + Sync + LinalgScalar + ComplexFloat<Real = f64>
+    {
         /// Whether samples of this kind hold the band of the receiver.
         fn check_band(receiver: &Receiver) -> Result<(), Error>;
 
@@ -43,6 +49,26 @@ pub(crate) mod sealed {
             scratch: &mut NoiseScratch,
             out_a: &mut [Self],
         );
+
+        /// Covariance of the samples `m` and `n` without noise, from that of the envelope.
+        fn covariance_a2(
+            detector: &Detector,
+            m: usize,
+            n: usize,
+            envelope_a2: Complex<f64>,
+        ) -> Self;
+
+        /// Covariance of the noise at each lag below `lags`.
+        fn noise_covariance_a2(detector: &Detector, lags: usize) -> Vec<f64>;
+
+        /// The number times a real one.
+        fn scaled(self, factor: f64) -> Self;
+
+        /// A normal number of mean square 1; circular if it is complex.
+        fn normal<R: Rng + ?Sized>(rng: &mut R) -> Self;
+
+        /// Root of the sum of the squares of so many normal numbers.
+        fn root_of_squares<R: Rng + ?Sized>(numbers: usize, rng: &mut R) -> Self;
 
         /// Real numbers that the sample consists of.
         fn for_each_part(&mut self, act: impl FnMut(&mut f64));
@@ -68,6 +94,31 @@ pub(crate) mod sealed {
             from.noise.add_to(rng, scratch, out_a);
         }
 
+        fn covariance_a2(
+            detector: &Detector,
+            m: usize,
+            n: usize,
+            envelope_a2: Complex<f64>,
+        ) -> Self {
+            (envelope_a2 * detector.carrier[m] * detector.carrier[n].conj()).re
+        }
+
+        fn noise_covariance_a2(detector: &Detector, lags: usize) -> Vec<f64> {
+            detector.noise.covariance_a2(lags)
+        }
+
+        fn scaled(self, factor: f64) -> Self {
+            self * factor
+        }
+
+        fn normal<R: Rng + ?Sized>(rng: &mut R) -> Self {
+            rng.sample(StandardNormal)
+        }
+
+        fn root_of_squares<R: Rng + ?Sized>(numbers: usize, rng: &mut R) -> Self {
+            (2.0 * gamma(0.5 * numbers as f64, rng)).sqrt()
+        }
+
         fn for_each_part(&mut self, mut act: impl FnMut(&mut f64)) {
             act(self);
         }
@@ -91,9 +142,36 @@ pub(crate) mod sealed {
             from.baseband_noise.add_to(rng, scratch, out_a);
         }
 
+        fn covariance_a2(_: &Detector, _: usize, _: usize, envelope_a2: Self) -> Self {
+            envelope_a2
+        }
+
+        fn noise_covariance_a2(detector: &Detector, lags: usize) -> Vec<f64> {
+            detector.baseband_noise.covariance_a2(lags)
+        }
+
+        fn scaled(self, factor: f64) -> Self {
+            self * factor
+        }
+
+        fn normal<R: Rng + ?Sized>(rng: &mut R) -> Self {
+            let re: f64 = rng.sample(StandardNormal);
+            let im: f64 = rng.sample(StandardNormal);
+            Self::new(re, im) * FRAC_1_SQRT_2
+        }
+
+        fn root_of_squares<R: Rng + ?Sized>(numbers: usize, rng: &mut R) -> Self {
+            Self::from(gamma(numbers as f64, rng).sqrt())
+        }
+
         fn for_each_part(&mut self, mut act: impl FnMut(&mut f64)) {
             act(&mut self.re);
             act(&mut self.im);
         }
+    }
+
+    /// A gamma-distributed number of a positive shape and scale 1.
+    fn gamma<R: Rng + ?Sized>(shape: f64, rng: &mut R) -> f64 {
+        Gamma::new(shape, 1.0).map_or(f64::NAN, |gamma| gamma.sample(rng))
     }
 }

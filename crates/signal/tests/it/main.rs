@@ -2,6 +2,7 @@
 //! windows, noise, scans, converters, extreme cases.
 #![allow(clippy::unwrap_used)] // a helper of a test may panic as the test may
 
+mod accumulated;
 mod baseband;
 mod covariance;
 mod envelopes;
