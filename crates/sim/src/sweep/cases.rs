@@ -91,34 +91,24 @@ impl Sweep {
     /// # Errors
     /// Keys, values and expressions that cannot be; more than [`MOST_CASES`]; no case; the first case whose scene is refused.
     pub fn parse(text: &str, path: &Path, request: &Request) -> Result<Self, Error> {
-        // The reader of scenes says better what is no TOML.
-        let of_scene = |other: Error| {
-            SceneFile::parse(text, path)
-                .err()
-                .map_or(other, Error::from)
-        };
         let base = toml::from_str::<Table>(text).map_err(|e| {
-            of_scene(
-                SceneError::Malformed {
-                    path: path.to_owned(),
-                    line: 1,
-                    message: e.message().into(),
-                }
-                .into(),
-            )
+            let malformed = SceneError::Malformed {
+                path: path.to_owned(),
+                line: 1,
+                message: e.message().into(),
+            };
+            scene_error(text, path, malformed.into())
         })?;
         let grid = Grid::new(path, base, request)?;
-        // What is wrong without the sweep is told with its line.
-        let cases = grid.cases().map_err(of_scene)?;
-        let seed = request
-            .independent
-            .then(|| Column::named("seed", "", true))
-            .and_then(Result::ok);
-        let keys: Vec<VaryingKey> = grid
-            .columns()
-            .chain(&seed)
-            .map(|column| column.shown.clone())
-            .collect();
+        let cases = grid
+            .cases()
+            .map_err(|error| scene_error(text, path, error))?;
+        let mut keys: Vec<VaryingKey> = grid.columns().map(|column| column.shown.clone()).collect();
+        if request.independent
+            && let Ok(seed) = Column::named("seed", "", true)
+        {
+            keys.push(seed.shown);
+        }
         let origin = grid.origin(&keys, &cases);
         Ok(Self {
             keys,
@@ -140,6 +130,14 @@ impl Sweep {
     /// What went wrong with a case, and with how many others.
     pub(super) fn failed(&self, case: &Case, others: usize, error: Error) -> Error {
         failed(case.index, self.described(case), others, error)
+    }
+}
+
+/// The error that the text of a scene has without the sweep, which names its line; another one if it has none.
+fn scene_error(text: &str, path: &Path, other: Error) -> Error {
+    match SceneFile::parse(text, path) {
+        Ok(_) => other,
+        Err(error) => error.into(),
     }
 }
 
@@ -184,10 +182,29 @@ fn problem(key: &str, value: &str, allowed: impl Into<String>) -> Problem {
     }
 }
 
-/// Keys that vary together, and their values.
-struct Axis {
-    columns: Vec<Column>,
-    rows: Vec<Vec<Value>>,
+/// Keys that vary together, and their values, a row for each combination.
+type Axis = (Vec<Column>, Vec<Vec<Value>>);
+/// Refuses keys that vary twice.
+fn check_columns(
+    columns: &[Column],
+    lets: &[(Column, &str)],
+    is_independent: bool,
+) -> Result<(), Error> {
+    let mut paths = Vec::new();
+    let mut has_seed = false;
+    for column in columns.iter().chain(lets.iter().map(|(own, _)| own)) {
+        if paths.contains(&&column.key.path) {
+            let why = "each key varies once, by --vary, --cases or --let";
+            return Err(refused("sweep", problem(&column.shown.name, "", why)));
+        }
+        paths.push(&column.key.path);
+        has_seed |= column.key.path == "seed";
+    }
+    if is_independent && has_seed {
+        let why = "with --independent each case has a seed of its own: leave one of the two out";
+        return Err(refused("sweep", problem("seed", "", why)));
+    }
+    Ok(())
 }
 
 /// A scene, keys, and the values of each combination of them.
@@ -204,73 +221,51 @@ struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     fn new(path: &'a Path, base: Table, request: &'a Request) -> Result<Self, Error> {
-        let of = |word: &'static str| move |problem| refused(word, problem);
-        let mut axes: Vec<Axis> = request
-            .list
-            .as_deref()
-            .map(list)
-            .transpose()?
-            .into_iter()
-            .collect();
-        for text in &request.vary {
-            axes.push(axis(text).map_err(of("--vary"))?);
+        let mut axes: Vec<Axis> = Vec::new();
+        if let Some(path) = &request.list {
+            axes.push(list(path)?);
         }
-        let lets = request
-            .lets
-            .iter()
-            .map(|text| binding(text).map_err(of("--let")))
-            .collect::<Result<Vec<_>, _>>()?;
+        for text in &request.vary {
+            axes.push(axis(text).map_err(|problem| refused("--vary", problem))?);
+        }
+        let mut lets = Vec::new();
+        for text in &request.lets {
+            lets.push(binding(text).map_err(|problem| refused("--let", problem))?);
+        }
         for text in &request.conditions {
             expression::holds(text, None)
                 .map_err(|why| refused("--where", problem("condition", text, why)))?;
         }
-        let count = axes
-            .iter()
-            .map(|axis| axis.rows.len() as f64)
-            .product::<f64>();
-        let columns: Vec<&Column> = axes
-            .iter()
-            .flat_map(|axis| &axis.columns)
-            .chain(lets.iter().map(|(own, _)| own))
-            .collect();
-        let again = |(i, column): &(usize, &&Column)| {
-            columns[..*i].iter().any(|c| c.key.path == column.key.path)
-        };
-        if let Some((_, column)) = columns.iter().enumerate().find(again) {
-            let why = "each key varies once, by --vary, --cases or --let";
-            return Err(refused("sweep", problem(&column.shown.name, "", why)));
+        let mut count = 1.0;
+        let mut columns = Vec::new();
+        // The last axis is the fastest.
+        for (keys, rows) in &mut axes {
+            count *= rows.len() as f64;
+            columns.append(keys);
         }
-        if request.independent && columns.iter().any(|column| column.key.path == "seed") {
-            let why =
-                "with --independent each case has a seed of its own: leave one of the two out";
-            return Err(refused("sweep", problem("seed", "", why)));
-        }
+        check_columns(&columns, &lets, request.independent)?;
         if count > MOST_CASES as f64 {
             let why =
                 format!("a sweep has 1 to {MOST_CASES} cases: fewer values, or several sweeps");
-            return Err(refused(
-                "sweep",
-                problem("number of cases", &format!("{count:?}"), why),
-            ));
+            let problem = problem("number of cases", &format!("{count:?}"), why);
+            return Err(refused("sweep", problem));
         }
-        // The last axis is the fastest.
-        let mut rows = vec![Vec::new()];
-        for axis in &axes {
-            let longer = |row: &Vec<Value>| {
-                axis.rows
-                    .iter()
-                    .map(|own| [&row[..], own].concat())
-                    .collect::<Vec<_>>()
-            };
-            rows = rows.iter().flat_map(longer).collect();
+        let mut combinations = vec![Vec::new()];
+        for (_, rows) in &axes {
+            let mut longer = Vec::with_capacity(combinations.len() * rows.len());
+            for combination in &combinations {
+                for row in rows {
+                    longer.push([&combination[..], row].concat());
+                }
+            }
+            combinations = longer;
         }
-        let columns = axes.into_iter().flat_map(|axis| axis.columns).collect();
         Ok(Self {
             path,
             base,
             request,
             columns,
-            rows,
+            rows: combinations,
             lets,
         })
     }
@@ -316,7 +311,7 @@ impl<'a> Grid<'a> {
         Ok(cases)
     }
 
-    /// The scene of a combination, whose values are told one after the other; none where a condition does not hold.
+    /// The scene of a combination, whose values are reported one after the other; none where a condition does not hold.
     fn scene(
         &self,
         row: &[Value],
@@ -331,29 +326,21 @@ impl<'a> Grid<'a> {
             );
         }
         for (column, value) in self.columns.iter().zip(row) {
-            values.push(shown(value));
+            values.push(cell_text(value));
             set(&mut table, &column.key.path, value.clone());
         }
         for (column, expression) in &self.lets {
-            let refused =
-                |why: String| refused("--let", problem(&column.shown.name, expression, why));
             let whole = self.whole(&table)?;
-            let number = expression::value(expression, Some(&|name| value_of(&whole, name)))
-                .map_err(refused)?;
-            let value = column
-                .key
-                .of_number(number)
-                .map_err(|problem| refused(problem.allowed))?;
-            values.push(shown(&value));
+            let value = computed(column, expression, &whole)
+                .map_err(|why| refused("--let", problem(&column.shown.name, expression, why)))?;
+            values.push(cell_text(&value));
             set(&mut table, &column.key.path, value);
         }
         if !self.request.conditions.is_empty() {
             let whole = self.whole(&table)?;
             for condition in &self.request.conditions {
-                let refused = |why| refused("--where", problem("condition", condition, why));
-                if !expression::holds(condition, Some(&|name| value_of(&whole, name)))
-                    .map_err(refused)?
-                {
+                let holds = expression::holds(condition, Some(&|name| value_of(&whole, name)));
+                if !holds.map_err(|why| refused("--where", problem("condition", condition, why)))? {
                     return Ok(None);
                 }
             }
@@ -400,6 +387,15 @@ impl<'a> Grid<'a> {
     }
 }
 
+/// The value of a key by an expression of other keys.
+fn computed(column: &Column, expression: &str, whole: &Value) -> Result<Value, String> {
+    let number = expression::value(expression, Some(&|name| value_of(whole, name)))?;
+    column
+        .key
+        .of_number(number)
+        .map_err(|problem| problem.allowed)
+}
+
 fn seed_of(table: &Table) -> Option<u64> {
     u64::try_from(table.get("seed")?.as_integer()?).ok()
 }
@@ -439,45 +435,50 @@ fn axis(word: &str) -> Result<Axis, Problem> {
             .map(|value| key.read(value))
             .collect::<Result<_, _>>()?,
     };
-    Ok(Axis {
-        columns: vec![column],
-        rows: values.into_iter().map(|value| vec![value]).collect(),
-    })
+    let rows = values.into_iter().map(|value| vec![value]).collect();
+    Ok((vec![column], rows))
 }
 
 /// `a:b:n`: from a to b, both as written.
 fn range_of(is_log: bool, text: &str) -> Result<Vec<f64>, String> {
-    let wrong = || {
-        format!(
-            "lin:FIRST:LAST:COUNT or log:FIRST:LAST:COUNT with finite numbers (log: above 0) and a count from 2 to \
-             {MOST_CASES}, e.g. log:100e-9:800e-9:7"
-        )
+    let Some([first, last, count]) = three_numbers(text) else {
+        return Err(wrong_range());
     };
-    let [first, last, count] = text.split(':').collect::<Vec<_>>()[..] else {
-        return Err(wrong());
-    };
-    let (Ok(first), Ok(last), Ok(count)) = (
-        first.parse::<f64>(),
-        last.parse::<f64>(),
-        count.parse::<f64>(),
-    ) else {
-        return Err(wrong());
-    };
-    let fine = first.is_finite() && last.is_finite() && (!is_log || (first > 0.0 && last > 0.0));
-    if !fine || count.fract() != 0.0 || !(2.0..=MOST_CASES as f64).contains(&count) {
-        return Err(wrong());
+    let is_finite = first.is_finite() && last.is_finite();
+    if !is_finite || (is_log && !(first > 0.0 && last > 0.0)) {
+        return Err(wrong_range());
     }
-    let steps = count - 1.0;
-    let at = |i: usize| {
-        let part = i as f64 / steps;
-        match i {
+    if count.fract() != 0.0 || !(2.0..=MOST_CASES as f64).contains(&count) {
+        return Err(wrong_range());
+    }
+    let last_index = count as usize - 1;
+    let mut values = Vec::with_capacity(count as usize);
+    for index in 0..=last_index {
+        let fraction = index as f64 / (count - 1.0);
+        values.push(match index {
             0 => first,
-            _ if i as f64 == steps => last,
-            _ if is_log => first * (last / first).powf(part),
-            _ => first + (last - first) * part,
-        }
-    };
-    Ok((0..count as usize).map(at).collect())
+            _ if index == last_index => last,
+            _ if is_log => first * (last / first).powf(fraction),
+            _ => first + (last - first) * fraction,
+        });
+    }
+    Ok(values)
+}
+
+/// Three numbers between colons.
+fn three_numbers(text: &str) -> Option<[f64; 3]> {
+    let mut numbers = Vec::new();
+    for part in text.split(':') {
+        numbers.push(part.parse().ok()?);
+    }
+    numbers.try_into().ok()
+}
+
+fn wrong_range() -> String {
+    format!(
+        "lin:FIRST:LAST:COUNT or log:FIRST:LAST:COUNT with finite numbers (log: above 0) and a count from 2 to \
+         {MOST_CASES}, e.g. log:100e-9:800e-9:7"
+    )
 }
 
 /// `KEY = EXPRESSION`.
@@ -487,48 +488,50 @@ fn binding(word: &str) -> Result<(Column, &str), Problem> {
         .split_once('=')
         .ok_or_else(|| problem("--let", word, example))?;
     let column = Column::named(name, text, true)?;
-    let refuse = |why: String| problem(&column.shown.name, text.trim(), why);
+    let text = text.trim();
     if column.shown.holds == Holds::Texts {
-        return Err(refuse(
-            "an expression is a number, and this key takes none".into(),
+        return Err(problem(
+            &column.shown.name,
+            text,
+            "an expression is a number, and this key is none",
         ));
     }
-    expression::value(text, None).map_err(refuse)?;
-    Ok((column, text.trim()))
+    expression::value(text, None).map_err(|why| problem(&column.shown.name, text, why))?;
+    Ok((column, text))
 }
 
 /// The keys and rows of a list file.
 fn list(path: &Path) -> Result<Axis, Error> {
-    let of_file = |problem: Problem| refused(&path.display().to_string(), problem);
     let table = TextTable::read(path)?;
+    let name = path.display().to_string();
+    list_of_table(&table).map_err(|problem| refused(&name, problem))
+}
+
+fn list_of_table(table: &TextTable) -> Result<Axis, Problem> {
     if table.rows.is_empty() {
-        return Err(of_file(problem(
+        return Err(problem(
             "rows",
             "0",
             "at least one row below the names of the keys",
-        )));
+        ));
     }
-    let read = || {
-        let columns: Vec<Column> = table
-            .header
-            .iter()
-            .map(|name| Column::named(name, "", false))
-            .collect::<Result<_, _>>()?;
-        let row = |cells: &Vec<String>| {
-            columns
-                .iter()
-                .zip(cells)
-                .map(|(column, cell)| column.key.read(cell))
-                .collect()
-        };
-        let rows = table.rows.iter().map(row).collect::<Result<_, Problem>>()?;
-        Ok(Axis { columns, rows })
-    };
-    read().map_err(of_file)
+    let mut columns = Vec::with_capacity(table.header.len());
+    for name in &table.header {
+        columns.push(Column::named(name, "", false)?);
+    }
+    let mut rows = Vec::with_capacity(table.rows.len());
+    for cells in &table.rows {
+        let mut row = Vec::with_capacity(cells.len());
+        for (column, cell) in columns.iter().zip(cells) {
+            row.push(column.key.read(cell)?);
+        }
+        rows.push(row);
+    }
+    Ok((columns, rows))
 }
 
-/// A value as the results show it.
-fn shown(value: &Value) -> String {
+/// The text of a value in the results.
+fn cell_text(value: &Value) -> String {
     match value {
         Value::Float(number) => float_text(*number),
         Value::String(text) => text.clone(),

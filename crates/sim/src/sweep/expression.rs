@@ -53,6 +53,19 @@ pub(crate) fn holds(text: &str, values: Values<'_>) -> Result<bool, String> {
     Ok(compare(&value(left, values)?, &value(right, values)?))
 }
 
+/// Length of the number that a text begins with; a sign belongs to it behind an `e`.
+fn number_length(text: &str) -> usize {
+    let mut is_behind_e = false;
+    for (index, c) in text.char_indices() {
+        let is_sign = is_behind_e && matches!(c, '+' | '-');
+        if !is_sign && !c.is_ascii_digit() && !matches!(c, '.' | 'e' | 'E') {
+            return index;
+        }
+        is_behind_e = matches!(c, 'e' | 'E');
+    }
+    text.len()
+}
+
 /// Two values and the operator between them.
 fn combined(a: f64, operator: char, b: f64) -> Result<f64, String> {
     let value = match operator {
@@ -149,22 +162,11 @@ impl Parser<'_> {
                 .map(|_| inner)
                 .ok_or_else(|| self.wrong("a closing bracket"));
         }
-        let here = self.rest;
-        let bytes = self.rest.as_bytes();
-        let split = |belongs: &dyn Fn(usize, u8) -> bool| {
-            let end = bytes.iter().enumerate().position(|(i, b)| !belongs(i, *b));
-            here.split_at(end.unwrap_or(bytes.len()))
-        };
-        if bytes
-            .first()
-            .is_some_and(|b| b.is_ascii_digit() || *b == b'.')
+        if self
+            .rest
+            .starts_with(|c: char| c.is_ascii_digit() || c == '.')
         {
-            let is_sign = |i: usize, b: u8| {
-                i > 0 && matches!(bytes[i - 1], b'e' | b'E') && matches!(b, b'+' | b'-')
-            };
-            let (number, rest) = split(&|i, b| {
-                b.is_ascii_digit() || matches!(b, b'.' | b'e' | b'E') || is_sign(i, b)
-            });
+            let (number, rest) = self.rest.split_at(number_length(self.rest));
             let value = number
                 .parse()
                 .map_err(|_| self.wrong("a number, e.g. 1.5e-6,"))?;
@@ -175,7 +177,10 @@ impl Parser<'_> {
                 f64::NAN
             });
         }
-        let (name, rest) = split(&|_, b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.'));
+        let end = self
+            .rest
+            .find(|c: char| !(c.is_ascii_alphanumeric() || matches!(c, '_' | '.')));
+        let (name, rest) = self.rest.split_at(end.unwrap_or(self.rest.len()));
         if name.is_empty() {
             return Err(self.wrong("a number, a key or a bracket"));
         }

@@ -7,20 +7,23 @@ use super::stored::Row;
 
 /// The rows on the front of precision and resolution, in their order.
 pub(super) fn on_front(rows: &[Row]) -> Vec<&Row> {
-    let column = |name: &str| rows.iter().map(|row| row.result(name)).collect();
-    let on_front = front(&[column("resolution_m"), column("std_m_s")]);
-    rows.iter()
-        .zip(on_front)
-        .filter_map(|(row, is_on)| is_on.then_some(row))
-        .collect()
+    let resolution_m = rows.iter().map(|row| row.result("resolution_m")).collect();
+    let std_m_s = rows.iter().map(|row| row.result("std_m_s")).collect();
+    let mut found = Vec::new();
+    for (row, is_on_front) in rows.iter().zip(front(&[resolution_m, std_m_s])) {
+        if is_on_front {
+            found.push(row);
+        }
+    }
+    found
 }
 
 /// Whether each point is on the front; `costs` has a column for each objective, of which small values are better.
 #[must_use]
 pub fn front(costs: &[Vec<f64>]) -> Vec<bool> {
     let points = costs.iter().map(Vec::len).min().unwrap_or(0);
-    let is_finite = |point: usize| costs.iter().all(|column| column[point].is_finite());
-    let finite: Vec<usize> = (0..points).filter(|&point| is_finite(point)).collect();
+    let mut finite: Vec<usize> = (0..points).collect();
+    finite.retain(|&point| costs.iter().all(|column| column[point].is_finite()));
     let mut on_front = vec![false; points];
     for &point in &finite {
         on_front[point] = !finite.iter().any(|&other| dominates(costs, other, point));

@@ -30,9 +30,9 @@ fn leaves(keys: &[Key], path: &str, out: &mut Vec<SceneKey>) {
                     path: join(&here, tag),
                     kind: Kind::Choice(names),
                 });
-                kinds
-                    .iter()
-                    .for_each(|(_, inner)| leaves(inner, &here, out));
+                for (_, inner) in kinds {
+                    leaves(inner, &here, out);
+                }
             }
             _ if out.iter().any(|known| known.path == here) => {}
             kind => out.push(SceneKey {
@@ -66,11 +66,14 @@ fn shortens(short: &str, path: &str) -> bool {
 
 /// The key that a path names; `value` is what it was to be, for the message.
 pub(super) fn resolve(written: &str, value: &str) -> Result<SceneKey, Problem> {
-    let refuse = |allowed: String| Problem {
+    varying_key(written).cloned().map_err(|allowed| Problem {
         key: written.into(),
         value: value.into(),
         allowed,
-    };
+    })
+}
+
+fn varying_key(written: &str) -> Result<&'static SceneKey, String> {
     let exact = all().iter().find(|key| key.path == written);
     let named: Vec<&SceneKey> = match exact {
         Some(key) => vec![key],
@@ -81,69 +84,81 @@ pub(super) fn resolve(written: &str, value: &str) -> Result<SceneKey, Problem> {
     };
     let key = match named[..] {
         [one] => one,
-        [] => return Err(refuse(unknown(written))),
+        [] => return Err(unknown(written)),
         _ => {
             let paths: Vec<&str> = named.iter().map(|key| key.path.as_str()).collect();
-            return Err(refuse(format!(
+            return Err(format!(
                 "several keys have this name; one of {} is needed",
                 paths.join(", ")
-            )));
+            ));
         }
     };
     let section = key.path.split('.').next().unwrap_or_default();
     if WITHOUT_RESULT.contains(&section) {
-        return Err(refuse(format!(
+        return Err(format!(
             "a key of [{section}] changes no result of a sweep and cannot vary"
-        )));
-    }
-    if let Kind::List { .. } = key.kind {
-        return Err(refuse(
-            "a list cannot vary, only numbers, names and switches".into(),
         ));
     }
-    Ok(key.clone())
+    if let Kind::List { .. } = key.kind {
+        return Err("a list cannot vary, only numbers, names and switches".into());
+    }
+    Ok(key)
 }
 
 /// What to write instead of a path that no key has.
 fn unknown(written: &str) -> String {
-    let paths = || all().iter().map(|key| key.path.as_str());
-    let below: Vec<&str> = paths()
-        .filter_map(|path| path.strip_prefix(&format!("{written}.")))
-        .collect();
+    let paths: Vec<&str> = all().iter().map(|key| key.path.as_str()).collect();
+    let mut below = Vec::new();
+    for path in &paths {
+        below.extend(path.strip_prefix(&format!("{written}.")));
+    }
     if !below.is_empty() {
         return format!(
             "this is a table and cannot vary, its keys can: {}",
             below.join(", ")
         );
     }
-    let name = |path: &'static str| path.rsplit('.').next().unwrap_or(path);
-    let last = written.rsplit('.').next().unwrap_or(written);
-    let meant = near(written, paths()).or_else(|| {
-        near(last, paths().map(name)).and_then(|meant| paths().find(|path| name(path) == meant))
-    });
-    let of = |path: &'static str| path.split('.').next().unwrap_or(path);
-    let section = written.split('.').next().unwrap_or(written);
+    let mut meant = near(written, paths.iter().copied());
+    if meant.is_none() {
+        let name = near(last_part(written), paths.iter().map(|path| last_part(path)));
+        let mut paths = paths.iter().copied();
+        meant = name.and_then(|name| paths.find(|path| last_part(path) == name));
+    }
     let hint = meant
         .map(|path| format!("; did you mean {path}?"))
         .unwrap_or_default();
-    let mut where_to_look = "Known there";
-    let mut known = paths()
-        .filter(|path| of(path) == section)
-        .collect::<Vec<_>>();
-    if known.is_empty() {
-        (where_to_look, known) = ("Sections", paths().map(of).collect());
-        known.dedup();
+    let section = first_part(written);
+    let mut known = paths.clone();
+    known.retain(|path| first_part(path) == section);
+    if !known.is_empty() {
+        return format!(
+            "there is no such key{hint} Known there: {}",
+            known.join(", ")
+        );
     }
+    let mut sections: Vec<&str> = paths.iter().map(|path| first_part(path)).collect();
+    sections.dedup();
     format!(
-        "there is no such key{hint} {where_to_look}: {}",
-        known.join(", ")
+        "there is no such key{hint} Sections: {}",
+        sections.join(", ")
     )
+}
+
+/// The section of a path.
+fn first_part(path: &str) -> &str {
+    path.split('.').next().unwrap_or(path)
+}
+
+/// The name of a key without its tables.
+fn last_part(path: &str) -> &str {
+    path.rsplit('.').next().unwrap_or(path)
 }
 
 impl SceneKey {
     /// A text as a value of the key.
     pub(super) fn read(&self, text: &str) -> Result<Value, Problem> {
-        let (text, word) = (text.trim(), text.trim().trim_matches('"'));
+        let text = text.trim();
+        let word = text.trim_matches('"');
         let value = match &self.kind {
             Kind::Number | Kind::Whole { .. } => {
                 text.parse().ok().and_then(|number| self.number(number))

@@ -88,30 +88,25 @@ fn against(
     key: &str,
     (title, label, is_log, [result, bound]): &(&str, &str, bool, [&str; 2]),
 ) -> Option<CurvePlot> {
-    let x: Vec<f64> = rows
-        .iter()
-        .map(|row| row.key(key))
-        .filter(|x| x.is_finite())
-        .collect();
-    let (low, high) = x
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-            (low.min(*x), high.max(*x))
-        });
+    let mut low = f64::INFINITY;
+    let mut high = f64::NEG_INFINITY;
+    for x in rows.iter().map(|row| row.key(key)) {
+        if x.is_finite() {
+            low = low.min(x);
+            high = high.max(x);
+        }
+    }
     let axis = if low > 0.0 && high >= 8.0 * low {
         Axis::log(key)
     } else {
         Axis::linear(key)
     };
-    let mut plot = CurvePlot::new(
-        title,
-        axis,
-        if *is_log {
-            Axis::log(label)
-        } else {
-            Axis::linear(label)
-        },
-    );
+    let result_axis = if *is_log {
+        Axis::log(label)
+    } else {
+        Axis::linear(label)
+    };
+    let mut plot = CurvePlot::new(title, axis, result_axis);
     plot.shape = 0.6;
     let error = standard_error_of(result, results().map(|(name, ..)| name));
     let curves = curves(definition, rows, key);
@@ -119,28 +114,20 @@ fn against(
     // Without a name either no other key varies, or there are too many curves.
     let curves_are_whole = definition.free().count() == 1;
     for (colour, (curve, members)) in curves.iter().enumerate() {
-        let points = |name: &str| {
-            let found = members.iter().map(|row| (row.key(key), row.result(name)));
-            let mut points: Vec<(f64, f64)> = found
-                .filter(|(x, y)| x.is_finite() && y.is_finite())
-                .collect();
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            points
-        };
-        let values = points(result);
+        let values = points(members, key, result);
         any |= !values.is_empty();
         if !curve.is_empty() || curves_are_whole {
+            let bound = points(members, key, bound);
             plot = plot.with(Series::new("", Style::Line, values.clone()).in_colour(colour));
-            plot = plot.with(Series::new("", Style::Dash, points(bound)).in_colour(colour));
+            plot = plot.with(Series::new("", Style::Dash, bound).in_colour(colour));
         }
         // In the order of the values, whose x they share.
-        let bars: Vec<(f64, f64)> = error.map_or(Vec::new(), points);
-        let bar = |x: f64| {
-            bars.iter()
-                .find(|(at, _)| *at == x)
-                .map_or(0.0, |(_, error)| *error)
-        };
-        let half: Vec<f64> = values.iter().map(|(x, _)| bar(*x)).collect();
+        let errors = error.map_or(Vec::new(), |error| points(members, key, error));
+        let mut half = Vec::with_capacity(values.len());
+        for (x, _) in &values {
+            let error = errors.iter().find(|(at, _)| at == x);
+            half.push(error.map_or(0.0, |(_, error)| *error));
+        }
         plot = plot.with(
             Series::new(curve, Style::Markers, values)
                 .with_band(&half)
@@ -148,6 +135,20 @@ fn against(
         );
     }
     any.then_some(plot)
+}
+
+/// Finite values of a result against a key, in the order of the key.
+fn points(rows: &[&Row], key: &str, result: &str) -> Vec<(f64, f64)> {
+    let mut points = Vec::new();
+    for row in rows {
+        let x = row.key(key);
+        let y = row.result(result);
+        if x.is_finite() && y.is_finite() {
+            points.push((x, y));
+        }
+    }
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    points
 }
 
 /// Name of the column that has the standard error of a column: `std_m_s` has `std_standard_error_m_s`.
@@ -164,15 +165,14 @@ fn standard_error_of<'a>(
 fn curves<'r>(definition: &Definition, rows: &'r [Row], key: &str) -> Vec<(String, Vec<&'r Row>)> {
     let mut curves: Vec<(String, Vec<&Row>)> = Vec::new();
     for row in rows {
-        let others = definition
-            .free()
-            .map(|key| key.name.as_str())
-            .filter(|name| *name != key);
-        let short = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();
-        let label: Vec<String> = others
-            .map(|name| format!("{} {}", short(name), row.text(name)))
-            .collect();
-        let label = label.join(", ");
+        let mut labels = Vec::new();
+        for other in definition.free() {
+            if other.name != key {
+                let short = other.name.rsplit('.').next().unwrap_or_default();
+                labels.push(format!("{short} {}", row.text(&other.name)));
+            }
+        }
+        let label = labels.join(", ");
         match curves.iter_mut().find(|(known, _)| *known == label) {
             Some((_, members)) => members.push(row),
             None => curves.push((label, vec![row])),
@@ -187,14 +187,18 @@ fn curves<'r>(definition: &Definition, rows: &'r [Row], key: &str) -> Vec<(Strin
 
 /// Precision against resolution, with the front.
 fn front(rows: &[Row]) -> CurvePlot {
-    let point = |row: &Row| (row.result("resolution_m"), row.result("std_m_s"));
-    let mut best: Vec<(f64, f64)> = on_front(rows).into_iter().map(point).collect();
+    let mut best = Vec::new();
+    for row in on_front(rows) {
+        best.push((row.result("resolution_m"), row.result("std_m_s")));
+    }
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let bars: Vec<f64> = rows
-        .iter()
-        .map(|row| row.result("std_standard_error_m_s"))
-        .map(|error| if error.is_finite() { error } else { 0.0 })
-        .collect();
+    let mut all = Vec::with_capacity(rows.len());
+    let mut errors = Vec::with_capacity(rows.len());
+    for row in rows {
+        let error = row.result("std_standard_error_m_s");
+        all.push((row.result("resolution_m"), row.result("std_m_s")));
+        errors.push(if error.is_finite() { error } else { 0.0 });
+    }
     let x = Axis::linear("full width at half maximum in range [m]");
     CurvePlot::new(
         "Precision against resolution",
@@ -202,5 +206,5 @@ fn front(rows: &[Row]) -> CurvePlot {
         Axis::log("standard deviation [m/s]"),
     )
     .with(Series::new("front", Style::Line, best))
-    .with(Series::new("cases", Style::Markers, rows.iter().map(point)).with_band(&bars))
+    .with(Series::new("cases", Style::Markers, all).with_band(&errors))
 }

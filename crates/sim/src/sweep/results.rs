@@ -33,12 +33,11 @@ const LEAST_ESTIMATES: usize = 16;
 
 /// Names, units and meanings of the results, in the order of the columns.
 pub(super) fn results() -> impl Iterator<Item = (&'static str, &'static str, &'static str)> {
-    let of_line = |line: &'static str| {
+    include_str!("results.csv").lines().filter_map(|line| {
         let (name, rest) = line.split_once(',')?;
         let (unit, meaning) = rest.split_once(',')?;
         Some((name, unit, meaning))
-    };
-    include_str!("results.csv").lines().filter_map(of_line)
+    })
 }
 
 /// What is collected of the maps of a case.
@@ -108,8 +107,10 @@ impl<'p> Collected<'p> {
                     Flow::VortexPair(pair) => {
                         let centres =
                             vortex_pair(pair).centres(plan.wind.start_s + g.line_time_s[i]);
-                        let to = |centre_m: f64| (y_m - centre_m).hypot(z_m - centres.height_m);
-                        to(centres.left_y_m).min(to(centres.right_y_m)) / pair.spacing_m
+                        let below_m = z_m - centres.height_m;
+                        let left_m = (y_m - centres.left_y_m).hypot(below_m);
+                        let right_m = (y_m - centres.right_y_m).hypot(below_m);
+                        left_m.min(right_m) / pair.spacing_m
                     }
                     Flow::Simulated(_) | Flow::Fields(_) => f64::NAN,
                     Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => f64::INFINITY,
@@ -218,22 +219,21 @@ impl<'p> Collected<'p> {
     }
 }
 
+/// Moment of the squared weights of a window about its first sample.
+fn moment(window: &[f64], power: i32) -> f64 {
+    let weighted = window.iter().enumerate();
+    weighted.map(|(n, h)| h * h * (n as f64).powi(power)).sum()
+}
+
 /// Part of the estimates that say nothing of the air, and its standard error: those farther from it than any part of a peak, and
 /// as many of the others as a level floor over the band has there.
 fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
     let scene = plan.scene();
     let pulse = &plan.instrument.pulse;
     let window = scene.weighting().weights(scene.estimator.window_samples)?;
-    let moment = |power: i32| {
-        window
-            .iter()
-            .enumerate()
-            .map(|(n, h)| h * h * (n as f64).powi(power))
-            .sum::<f64>()
-    };
-    let mean = moment(1) / moment(0);
-    let window_s =
-        (moment(2) / moment(0) - mean * mean).max(1.0 / 12.0).sqrt() / scene.detector.sampling_hz;
+    let mean = moment(&window, 1) / moment(&window, 0);
+    let variance = moment(&window, 2) / moment(&window, 0) - mean * mean;
+    let window_s = variance.max(1.0 / 12.0).sqrt() / scene.detector.sampling_hz;
     // A window cannot be narrower in frequency than the inverse of its length.
     let width_hz = pulse
         .spectral_width_hz()

@@ -96,8 +96,8 @@ pub struct Summary {
 ///
 /// # Errors
 /// The first case that is refused, before anything is written; a case that cannot be run; what the system says.
-pub fn run<'s>(
-    sweep: &'s Sweep,
+pub fn run(
+    sweep: &Sweep,
     out: &Path,
     settings: Settings,
     observer: &dyn Observer,
@@ -113,86 +113,40 @@ pub fn run<'s>(
     let times = settings.shard.map_or("times.csv".into(), |s| {
         format!("times-{}-of-{}.csv", s.number, s.of)
     });
-    let mine: Vec<&Case> = sweep
-        .cases
-        .iter()
-        .filter(|c| settings.shard.is_none_or(|s| s.has(c.index)))
-        .collect();
+    let mut mine: Vec<&Case> = sweep.cases.iter().collect();
+    mine.retain(|case| settings.shard.is_none_or(|shard| shard.has(case.index)));
     let mut names = vec![times.clone()];
-    names.extend(mine.iter().flat_map(|case| case_files(case.index)));
+    for case in &mine {
+        names.extend(case_files(case.index));
+    }
     if settings.shard.is_none() {
         let list = |files: &mut outputs::Outputs| tables::list(&definition, None, files);
         names.extend(outputs::Outputs::names(Outputs::default(), list)?);
     }
     // Shards may begin at the same time, in one folder: each writes files of its own.
-    outputs::prepare(out, &names, existing, false).map_err(|error| match error {
-        Error::Export(OutputError::Exists { path }) if definition.is_in(out) => {
-            let reason = "it is of an earlier run of this sweep: --resume runs the cases without a result, \
-                          --overwrite runs all anew";
-            Error::Input {
-                path,
-                reason: reason.into(),
-            }
-        }
-        other => other,
-    })?;
+    outputs::prepare(out, &names, existing, false)
+        .map_err(|error| in_the_way(error, definition.is_in(out)))?;
     definition.write(out)?;
-    let is_due = |case: &&Case| !(settings.resume && definition.stored(out, case.index).is_some());
-    let due: Vec<&Case> = mine.iter().copied().filter(is_due).collect();
+    let mut due = mine.clone();
+    due.retain(|case| !(settings.resume && definition.stored(out, case.index).is_some()));
     observer.begin(Stage::Cases, due.len() as u64);
     let of_due_s = due.iter().filter_map(|case| core_s.get(case.index)).sum();
     observer.reach(&format!(
         "forecast: {} of one core, to a factor of two",
         seconds(of_due_s)
     ));
-    let mut signals = 0;
-    let mut walls = Vec::new();
-    for group in groups(due.iter().map(|case| &case.scene)) {
-        let planned = |&place: &usize| {
-            let case: &'s Case = due[place];
-            Ok((
-                case,
-                common
-                    .plan(&case.scene, Target::Map)
-                    .map_err(|e| sweep.failed(case, 0, e))?,
-            ))
-        };
-        for batch in batches(group.iter().map(planned).collect::<Result<_, Error>>()?) {
-            let begun = Instant::now();
-            let (cases, plans): (Vec<&Case>, Vec<Plan>) = batch.into_iter().unzip();
-            let found = rows(
-                &plans,
-                &common.efficiencies,
-                observer,
-                !settings.no_circulation,
-            );
-            let found = found.map_err(|e| sweep.failed(cases[0], 0, e))?;
-            signals += 1;
-            let wall_s = begun.elapsed().as_secs_f64() / found.len() as f64;
-            for (row, case) in found.iter().zip(&cases) {
-                definition.store(out, case, row, existing)?;
-                walls.push((case.index, wall_s));
-                observer.advance(1);
-                observer.reach(&sweep.described(case));
-            }
-        }
-    }
+    let (signals, mut walls) =
+        measure(sweep, &due, &common, &definition, (out, existing), observer)?;
     observer.end();
     let mut files = vec![write_times(out, &times, &definition, &mut walls)?];
     if settings.shard.is_none() {
-        let all: Option<Vec<_>> = (0..sweep.cases.len())
-            .map(|case| definition.stored(out, case))
-            .collect();
-        let gone = || Error::Input {
-            path: out.join("cases"),
-            reason: "a result that was written is gone".into(),
-        };
-        files.extend(tables::write(
-            &definition,
-            &all.ok_or_else(gone)?,
-            out,
-            existing,
-        )?);
+        let mut rows = Vec::with_capacity(sweep.cases.len());
+        for case in 0..sweep.cases.len() {
+            rows.push(definition.stored(out, case).ok_or_else(|| {
+                Error::input(&out.join("cases"), "a result that was written is gone")
+            })?);
+        }
+        files.extend(tables::write(&definition, &rows, out, existing)?);
     }
     let flows = common.winds.len();
     let efficiencies = common.efficiencies.computed();
@@ -204,6 +158,55 @@ pub fn run<'s>(
         signals,
         files,
     })
+}
+
+/// An error of the preparation of the folder; of a file of an earlier run of this sweep, with what to do.
+fn in_the_way(error: Error, is_of_this_sweep: bool) -> Error {
+    match error {
+        Error::Export(OutputError::Exists { path }) if is_of_this_sweep => Error::input(
+            &path,
+            "it is of an earlier run of this sweep: --resume runs the cases without a result, --overwrite runs all anew",
+        ),
+        error => error,
+    }
+}
+
+/// Measures cases, those with the same signals together, and stores their results; returns how often signals were made, and the
+/// wall time of each case, s.
+fn measure(
+    sweep: &Sweep,
+    due: &[&Case],
+    common: &Common,
+    definition: &Definition,
+    (out, existing): (&Path, Existing),
+    observer: &dyn Observer,
+) -> Result<(usize, Vec<(usize, f64)>), Error> {
+    let mut signals = 0;
+    let mut walls = Vec::new();
+    for group in groups(due.iter().map(|case| &case.scene)) {
+        let mut planned = Vec::with_capacity(group.len());
+        for index in group {
+            let case = due[index];
+            let plan = common.plan(&case.scene, Target::Map);
+            planned.push((case, plan.map_err(|e| sweep.failed(case, 0, e))?));
+        }
+        for batch in batches(planned) {
+            let begun = Instant::now();
+            let (cases, plans): (Vec<&Case>, Vec<Plan>) = batch.into_iter().unzip();
+            let fits = definition.circulation;
+            let found = rows(&plans, &common.efficiencies, observer, fits)
+                .map_err(|e| sweep.failed(cases[0], 0, e))?;
+            signals += 1;
+            let wall_s = begun.elapsed().as_secs_f64() / found.len() as f64;
+            for (row, case) in found.iter().zip(&cases) {
+                definition.store(out, case, row, existing)?;
+                walls.push((case.index, wall_s));
+                observer.advance(1);
+                observer.reach(&sweep.described(case));
+            }
+        }
+    }
+    Ok((signals, walls))
 }
 
 /// The plan and the map of every scene, in their order, without any file; what they have in common is computed once: flows,
@@ -264,25 +267,26 @@ impl Common {
 
 /// Plans every case, and finds out whether it fits the memory; returns the forecast of the time of each, s of one core.
 fn check(sweep: &Sweep, common: &Common, allow_large: bool) -> Result<Vec<f64>, Error> {
-    let checked = |case: &Case| -> Result<f64, Error> {
-        let plan = common.plan(&case.scene, Target::Map)?;
-        if !allow_large {
-            plan.fits()?;
-        }
-        Ok(plan.core_s())
-    };
-    let found: Vec<_> = sweep.cases.par_iter().map(checked).collect();
-    let others = found
-        .iter()
-        .filter(|found| found.is_err())
-        .count()
-        .saturating_sub(1);
-    sweep
+    let found: Vec<_> = sweep
         .cases
-        .iter()
-        .zip(found)
-        .map(|(case, found)| found.map_err(|e| sweep.failed(case, others, e)))
-        .collect()
+        .par_iter()
+        .map(|case| check_case(case, common, allow_large))
+        .collect();
+    let refused = found.iter().filter(|found| found.is_err()).count();
+    let mut core_s = Vec::with_capacity(found.len());
+    for (case, found) in sweep.cases.iter().zip(found) {
+        let others = refused.saturating_sub(1);
+        core_s.push(found.map_err(|e| sweep.failed(case, others, e))?);
+    }
+    Ok(core_s)
+}
+
+fn check_case(case: &Case, common: &Common, allow_large: bool) -> Result<f64, Error> {
+    let plan = common.plan(&case.scene, Target::Map)?;
+    if !allow_large {
+        plan.fits()?;
+    }
+    Ok(plan.core_s())
 }
 
 /// Places of the scenes with the same signals: those that differ in what is done with the records alone.

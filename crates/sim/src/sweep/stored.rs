@@ -111,10 +111,7 @@ impl Definition {
         }
         let reason = "it is of another sweep, of another version of the program or not all with or without \
                       --no-circulation: take another folder, or replace it with --overwrite";
-        Err(Error::Input {
-            path,
-            reason: reason.into(),
-        })
+        Err(Error::input(&path, reason))
     }
 
     /// Writes it into a folder, unless it is there: shards may begin at the same time.
@@ -136,10 +133,7 @@ impl Definition {
         let path = folder.join(SWEEP);
         let text = text_file::read(&path).map_err(Error::io("read what was swept from", &path))?;
         let reason = "it does not say what was swept, as `wakescope sweep --out` writes it";
-        serde_json::from_str(&text).map_err(|_| Error::Input {
-            path,
-            reason: reason.into(),
-        })
+        serde_json::from_str(&text).map_err(|_| Error::input(&path, reason))
     }
 
     pub(super) fn is_same(&self, other: &Self) -> bool {
@@ -163,22 +157,20 @@ impl Definition {
         results: &[f64],
         existing: Existing,
     ) -> Result<(), Error> {
-        let names = columns().map(|(name, ..)| name.to_owned());
-        let row = Row {
+        let mut row = Row {
             source: crate::PROGRAM.into(),
             scene_hash: case.scene.hash.clone(),
             case: case.index,
-            keys: self
-                .keys
-                .iter()
-                .map(|key| key.name.clone())
-                .zip(case.values.iter().cloned())
-                .collect(),
+            keys: BTreeMap::new(),
             circulation: self.circulation,
-            results: names
-                .zip(results.iter().map(|result| float_text(*result)))
-                .collect(),
+            results: BTreeMap::new(),
         };
+        for (key, value) in self.keys.iter().zip(&case.values) {
+            row.keys.insert(key.name.clone(), value.clone());
+        }
+        for ((name, ..), result) in columns().zip(results) {
+            row.results.insert(name.to_owned(), float_text(*result));
+        }
         let of = (Outputs::default(), case.scene.provenance());
         outputs::Outputs::write(&folder_of(folder, case.index), existing, of, |files| {
             files.add(SCENE, Some(case), |_, origin| Ok(origin.scene_file()))?;

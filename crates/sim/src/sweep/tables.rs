@@ -23,10 +23,6 @@ pub fn merge(
     out: &Path,
     existing: Existing,
 ) -> Result<Vec<PathBuf>, Error> {
-    let refuse = |reason: String| Error::Input {
-        path: "--merge".into(),
-        reason,
-    };
     let mut first: Option<(Definition, String)> = None;
     for folder in folders {
         let found = Definition::read(folder)?;
@@ -43,16 +39,14 @@ pub fn merge(
                      without --no-circulation, fit together",
                     found.sweep_hash, found.source, other.sweep_hash, other.source
                 );
-                return Err(Error::Input {
-                    path: folder.join(SWEEP),
-                    reason,
-                });
+                return Err(Error::input(&folder.join(SWEEP), reason));
             }
         }
         first = first.or(Some((found, folder.display().to_string())));
     }
     let Some((definition, _)) = first else {
-        return Err(refuse("at least one folder of a sweep is needed".into()));
+        let reason = "at least one folder of a sweep is needed";
+        return Err(Error::input(Path::new("--merge"), reason));
     };
     let mut rows = Vec::new();
     let mut missing = Vec::new();
@@ -67,13 +61,14 @@ pub fn merge(
     }
     if !missing.is_empty() {
         let more = if missing.len() > 10 { ", ..." } else { "" };
-        return Err(refuse(format!(
+        let reason = format!(
             "{} of the {} cases have no result in the folders to merge, numbers {}{more}: run their shards, or those that were \
              cut off with --resume",
             missing.len(),
             definition.scene_hashes.len(),
             missing[..missing.len().min(10)].join(", ")
-        )));
+        );
+        return Err(Error::input(Path::new("--merge"), reason));
     }
     write(&definition, &rows, out, existing)
 }
@@ -129,61 +124,57 @@ const EXACT_BELOW: f64 = 9_007_199_254_740_992.0;
 fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
     use crate::io::netcdf::{Data, Layout, Variable};
     use crate::keys::unit_of;
-    let texts = definition
-        .keys
-        .iter()
-        .flat_map(|key| rows.iter().map(|row| row.text(&key.name).len()));
-    let width = texts
-        .chain(rows.iter().map(|row| row.scene_hash.len()))
-        .chain([1])
-        .max()
-        .unwrap_or(1);
-    // What is not used is NUL: blanks stay in the words of readers.
-    let words = |name: &str, of: &dyn Fn(&Row) -> &str| {
-        let padded = |row: &Row| {
-            of(row)
-                .bytes()
-                .chain(std::iter::repeat(0))
-                .take(width)
-                .collect::<Vec<u8>>()
-        };
-        Variable::new(
-            name,
-            &["case", "string_length"],
-            Data::text(rows.iter().flat_map(padded).collect::<Vec<u8>>()),
-        )
-    };
-    let numbers = |name: &str, of: &dyn Fn(&Row) -> f64| {
-        Variable::new(name, &["case"], Data::f64(rows.iter().map(of)))
-    };
-    let case = rows
-        .iter()
-        .map(|row| i32::try_from(row.case).unwrap_or(i32::MAX));
-    let mut variables = vec![
-        Variable::new("case", &["case"], Data::i32(case)).text("long_name", "number of the case"),
-    ];
+    let mut width = 1;
+    for row in rows {
+        width = width.max(row.scene_hash.len());
+        for key in &definition.keys {
+            width = width.max(row.text(&key.name).len());
+        }
+    }
+    let mut numbers = Vec::with_capacity(rows.len());
+    let mut hashes = Vec::new();
+    for row in rows {
+        numbers.push(i32::try_from(row.case).unwrap_or(i32::MAX));
+        hashes.extend(padded(&row.scene_hash, width));
+    }
+    let case = Variable::new("case", &["case"], Data::i32(numbers));
+    let mut variables = vec![case.text("long_name", "number of the case")];
     for VaryingKey { name, holds, .. } in &definition.keys {
-        // Whole numbers that a double would round, such as drawn seeds, are words.
+        // Whole numbers that a double would round, such as drawn seeds, are texts.
         let is_round = rows
             .iter()
             .all(|row| row.key(name).abs() < EXACT_BELOW || *holds == Holds::Numbers);
         let variable = if is_round && *holds != Holds::Texts {
-            numbers(name, &|row| row.key(name)).text("units", unit_of(name).unwrap_or("1"))
+            let values = Data::f64(rows.iter().map(|row| row.key(name)));
+            Variable::new(name, &["case"], values).text("units", unit_of(name).unwrap_or("1"))
         } else {
-            words(name, &|row| row.text(name))
+            let mut texts = Vec::new();
+            for row in rows {
+                texts.extend(padded(row.text(name), width));
+            }
+            Variable::new(name, &["case", "string_length"], Data::text(texts))
         };
         variables.push(variable.text("long_name", &format!("key {name} of the scene")));
     }
     variables.push(
-        words("scene_hash", &|row| &row.scene_hash)
+        Variable::new("scene_hash", &["case", "string_length"], Data::text(hashes))
             .text("long_name", "hash of the scene of the case"),
     );
     for (name, unit, meaning) in results() {
-        let variable =
-            numbers(name, &|row| row.result(name)).attr("_FillValue", Data::f64([f64::NAN]));
-        variables.push(variable.text("units", unit).text("long_name", meaning));
+        let values = Data::f64(rows.iter().map(|row| row.result(name)));
+        let variable = Variable::new(name, &["case"], values)
+            .attr("_FillValue", Data::f64([f64::NAN]))
+            .text("units", unit);
+        variables.push(variable.text("long_name", meaning));
     }
     let dims = vec![("case", rows.len()), ("string_length", width)];
     let origin = &definition.origin();
     Ok(Layout::cf("Results of a sweep over scenes", dims, variables, origin).into_bytes(origin)?)
+}
+
+/// The bytes of a text of a fixed width. What is not used is NUL: blanks stay in the texts of readers.
+fn padded(text: &str, width: usize) -> Vec<u8> {
+    let mut bytes = text.as_bytes().to_vec();
+    bytes.resize(width, 0);
+    bytes
 }
