@@ -10,7 +10,7 @@ pub(crate) mod stage;
 pub use map::velocity_map;
 
 use crate::Error;
-use crate::beams::Beam;
+
 use crate::io::signals::{RawSignals, Recording};
 use crate::io::{Existing, Table, VelocityMap, hpl, tables};
 use crate::measure::beam_winds;
@@ -82,31 +82,7 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
         })?;
     }
     if plan.runs(Stage::Estimates) {
-        let pattern = &plan.scene().scan.pattern;
-        let map = result
-            .map
-            .as_ref()
-            .map(|estimates| velocity_map(plan, estimates));
-        list_map(plan, map.as_ref(), files)?;
-        let winds = result
-            .map
-            .as_ref()
-            .map(|estimates| beam_winds::beam_winds(plan, estimates))
-            .transpose()?
-            .flatten();
-        if pattern.has_beam_winds() {
-            files.table("wind", winds.as_deref(), |winds| {
-                Ok(beam_winds::table(winds))
-            })?;
-        }
-        #[cfg(feature = "plots")]
-        files.figure("map", map.as_ref(), |map| {
-            pictures::map(plan, map, winds.as_deref())
-        })?;
-        #[cfg(feature = "plots")]
-        if *pattern != Pattern::default() {
-            files.figure("scan", map.as_ref(), |_| Ok(pictures::scan(plan)))?;
-        }
+        list_estimates(plan, result, files)?;
     }
     if plan.runs(Stage::Retrieval) {
         files.table("retrieval", result.retrieval.as_ref(), |found| {
@@ -115,6 +91,32 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
         files.table("retrieval_summary", result.retrieval.as_ref(), |found| {
             Ok(found.error_table())
         })?;
+    }
+    Ok(())
+}
+
+/// The files of the estimates of a run: the map, winds of its beams, pictures.
+fn list_estimates(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Result<(), Error> {
+    let pattern = &plan.scene().scan.pattern;
+    let estimates = result.map.as_ref();
+    let map = estimates.map(|estimates| velocity_map(plan, estimates));
+    list_map(plan, map.as_ref(), files)?;
+    let winds = match estimates {
+        Some(estimates) => beam_winds::beam_winds(plan, estimates)?,
+        None => None,
+    };
+    if pattern.has_beam_winds() {
+        files.table("wind", winds.as_deref(), |winds| {
+            Ok(beam_winds::table(winds))
+        })?;
+    }
+    #[cfg(feature = "plots")]
+    files.figure("map", map.as_ref(), |map| {
+        pictures::map(plan, map, winds.as_deref())
+    })?;
+    #[cfg(feature = "plots")]
+    if *pattern != Pattern::default() {
+        files.figure("scan", map.as_ref(), |_| Ok(pictures::scan(plan)))?;
     }
     Ok(())
 }
@@ -231,11 +233,8 @@ pub fn write_set_up(plan: &Plan, path: &Path, existing: Existing) -> Result<(), 
         Some("svg") => figure.svg(&origin)?.into_bytes(),
         Some("png") => figure.png(&origin)?,
         _ => {
-            let reason = "a picture ends in .svg or .png, such as set-up.svg".into();
-            return Err(Error::Input {
-                path: path.to_owned(),
-                reason,
-            });
+            let reason = "a picture ends in .svg or .png, such as set-up.svg";
+            return Err(Error::input(path, reason));
         }
     };
     let folder = path
@@ -250,7 +249,7 @@ pub fn write_set_up(plan: &Plan, path: &Path, existing: Existing) -> Result<(), 
 /// Efficiency and SNR as a table.
 pub fn profile_table(profile: &RangeProfile) -> Table {
     let e = &profile.efficiency;
-    let table = Table::new()
+    let mut table = Table::new()
         .float("range_m", e.range_m.clone())
         .float("efficiency", e.mean.clone())
         .float(
@@ -259,42 +258,41 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
         )
         .float("efficiency_standard_error", e.standard_error.clone())
         .float("snr_db", profile.snr_db.clone());
-    profile.others.iter().fold(table, |table, (name, other)| {
-        let table = table.float(name, other.mean.clone());
-        match other.standard_error.iter().any(|&error| error > 0.0) {
-            true => table.float(
-                &format!("{name}_standard_error"),
-                other.standard_error.clone(),
-            ),
-            false => table,
+    for (name, other) in &profile.others {
+        table = table.float(name, other.mean.clone());
+        if other.standard_error.iter().any(|&error| error > 0.0) {
+            let name = format!("{name}_standard_error");
+            table = table.float(&name, other.standard_error.clone());
         }
-    })
+    }
+    table
 }
 
 /// The raw signals of a run, with what makes them readable.
 fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
     let scene = plan.scene();
     let g = &plan.geometry;
-    let beams: Vec<Beam> = (0..g.schedule.pulses())
-        .map(|pulse| g.schedule.beam_of_pulse(pulse))
-        .collect();
+    let mut pulse_time_s = Vec::with_capacity(g.schedule.pulses());
+    let mut elevation_rad = Vec::with_capacity(g.schedule.pulses());
+    let mut azimuth_rad = Vec::new();
+    for pulse in 0..g.schedule.pulses() {
+        let beam = g.schedule.beam_of_pulse(pulse);
+        pulse_time_s.push(plan.wind.start_s + beam.time_s);
+        elevation_rad.push(beam.elevation_rad);
+        if !g.schedule.is_plane() {
+            azimuth_rad.push(beam.azimuth_rad);
+        }
+    }
     let first_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
     Some(RawSignals {
         recording: recording(plan),
         range_m: g.layer_range_m().collect(),
         radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
-        pulse_time_s: beams
-            .iter()
-            .map(|beam| plan.wind.start_s + beam.time_s)
-            .collect(),
+        pulse_time_s,
         current_a: result.signals_a.as_ref()?.view(),
         quadrature_a: result.quadrature_a.as_ref().map(|values| values.view()),
-        elevation_rad: beams.iter().map(|beam| beam.elevation_rad).collect(),
-        azimuth_rad: if g.schedule.is_plane() {
-            Vec::new()
-        } else {
-            beams.iter().map(|beam| beam.azimuth_rad).collect()
-        },
+        elevation_rad,
+        azimuth_rad,
         time_s: (0..g.samples)
             .map(|k| first_s + k as f64 / scene.detector.sampling_hz)
             .collect(),

@@ -18,17 +18,16 @@ pub(super) fn accuracy(
     folder: &FolderArgs,
     cli: &Cli,
 ) -> Result<u8, Error> {
-    let prepare = || folder.prepare(cli, |files| Report::list(None, files));
     let scene = path.filter(|path| preset.is_none() && !cli.is_case(path));
     let report = match scene {
         Some(path) => {
             let file = cli.scene(path)?;
-            prepare()?;
+            folder.prepare(cli, |files| Report::list(None, files))?;
             Report::of_scene(&file, request, &*cli.observer())?
         }
         None => {
             let file = seeded(case_file(path, preset, cli)?, cli)?;
-            prepare()?;
+            folder.prepare(cli, |files| Report::list(None, files))?;
             Report::of_case(&file, request, &*cli.observer())?
         }
     };

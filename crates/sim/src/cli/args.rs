@@ -150,11 +150,8 @@ impl ScanArgs {
         observer: &dyn Observer,
     ) -> Result<Scans, Error> {
         let Some(scene) = scene else {
-            let reason = "it holds raw signals: --scene says which instrument recorded them".into();
-            return Err(Error::Input {
-                path: path.to_owned(),
-                reason,
-            });
+            let reason = "it holds raw signals: --scene says which instrument recorded them";
+            return Err(Error::input(path, reason));
         };
         let mut records = recorded::open(path, &RawFormat::default(), &scene.content)?;
         records.scale = self.scale.unwrap_or(1.0);
@@ -181,8 +178,10 @@ impl ScanArgs {
                 Recorded::Measured { scans, spectra } => (scans, spectra),
                 Recorded::OfRun { .. } => (Vec::new(), None),
             };
-        let map = |(sweep, scan)| retrieve::scan_of_signals(path, sweep, &plan, scan);
-        let maps = scans.iter().enumerate().map(map).collect();
+        let mut maps = Vec::with_capacity(scans.len());
+        for (sweep, scan) in scans.iter().enumerate() {
+            maps.push(retrieve::scan_of_signals(path, sweep, &plan, scan));
+        }
         Ok(Scans {
             maps,
             left_out: Vec::new(),
@@ -278,9 +277,14 @@ pub(super) fn range(word: &str) -> Result<f64, String> {
 }
 
 pub(super) fn turbulence(word: &str) -> Result<Turbulence, String> {
-    let is_good = |value: &f64| *value > 0.0 && value.is_finite();
-    let allowed = "two numbers above 0, m/s and m, with a comma between, e.g. 1.2,25";
-    let (deviation_m_s, length_m) = two(word, |(a, b)| is_good(a) && is_good(b), allowed)?;
+    let (deviation_m_s, length_m) = two(
+        word,
+        |(deviation_m_s, length_m): &(f64, f64)| {
+            let are_finite = deviation_m_s.is_finite() && length_m.is_finite();
+            are_finite && *deviation_m_s > 0.0 && *length_m > 0.0
+        },
+        "two numbers above 0, m/s and m, with a comma between, e.g. 1.2,25",
+    )?;
     Ok(Turbulence {
         deviation_m_s,
         length_m,
@@ -297,10 +301,9 @@ pub(super) fn spacing(word: &str) -> Result<(f64, f64), String> {
 }
 
 pub(super) fn stride(word: &str) -> Result<(usize, usize), String> {
-    let is_good = |n: &usize| (1..=1000).contains(n);
     two(
         word,
-        |(lines, gates)| is_good(lines) && is_good(gates),
+        |(lines, gates)| (1..=1000).contains(lines) && (1..=1000).contains(gates),
         "two whole numbers from 1 to 1000, e.g. 4,8",
     )
 }

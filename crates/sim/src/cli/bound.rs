@@ -5,7 +5,6 @@ use super::{Cli, paths};
 use crate::io::Existing;
 use crate::measure::bound::{bound as of_plan, fits, points};
 use crate::measure::budget::{Budget, scan_ranges_m};
-use crate::outputs::Outputs;
 use crate::plan::{Plan, Target};
 use crate::progress::Silent;
 use crate::{Error, scene};
@@ -73,9 +72,9 @@ pub(super) fn budget(
     let mut files = Vec::new();
     if let Some(folder) = out {
         let of = (scene::Outputs::default(), plan.file.provenance());
-        let list =
-            |files: &mut Outputs| files.table("budget", Some(&found), |found| Ok(found.table()));
-        files = cli.write(folder, existing, of, list)?;
+        files = cli.write(folder, existing, of, |files| {
+            files.table("budget", Some(&found), |found| Ok(found.table()))
+        })?;
         text += &format!("wrote {}\n", folder.join("budget.csv").display());
     }
     let object = json!({

@@ -14,13 +14,14 @@ use crate::io::csv::digits;
 use crate::io::scans::ReadScan;
 use crate::outputs::Outputs;
 use crate::plan::{Plan, Target};
+use crate::progress::Observer;
 use crate::retrieve::{gate_of, scene_of};
-use crate::scene::{Scene, SceneFile};
+use crate::scene::Scene;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use wakescope_estimate::retrieval::{Gate, ScanMap};
-use wakescope_estimate::vortex_fit::WakeModel;
+use wakescope_estimate::vortex_fit::{Vortex, WakeModel};
 use wakescope_estimate::wake_detection::DetectorOptions;
 
 /// Arguments of `wakescope detect`.
@@ -63,17 +64,15 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
         cli.refuse_idle("detect", WITHOUT_SCANS)?;
     }
     let observer = cli.observer();
-    let stated = args
-        .scene
-        .as_deref()
-        .map(|path| cli.scene(path))
-        .transpose()?;
+    let stated = match &args.scene {
+        Some(path) => Some(cli.scene(path)?),
+        None => None,
+    };
     let mut scans = Vec::new();
     let mut notes = Vec::new();
-    let inputs = each_usable(&args.data, &*observer, |path| {
+    for read in each_usable(&args.data, &*observer, |path| {
         args.scans.read(path, stated.as_ref(), false, &*observer)
-    })?;
-    for read in inputs {
+    })? {
         scans.extend(read.maps);
         notes.extend(read.left_out);
     }
@@ -81,72 +80,115 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
         (None, Some(scan)) => scene_of(scan, &*observer)?,
         (stated, _) => stated,
     };
-    let still = scene.as_ref().map(SceneFile::in_still_air).transpose()?;
-    let plan = still
-        .map(|scene| Plan::new(scene, Target::Map))
-        .transpose()?;
+    let plan = match &scene {
+        Some(scene) => Some(Plan::new(scene.in_still_air()?, Target::Map)?),
+        None => None,
+    };
     args.folder.prepare(cli, |files| list(args, None, files))?;
-    let of_plan = plan.as_ref().map(|plan| plan.scene());
-    let (gate, note) = gate_of(scans.first(), args.air.gate_std, of_plan)?;
+    let plan_scene = plan.as_ref().map(|plan| plan.scene());
+    let (gate, note) = gate_of(scans.first(), args.air.gate_std, plan_scene)?;
     notes.extend(note.map(str::to_owned));
-    let mut settings = args.settings(cli, of_plan, gate);
+    let mut settings = args.settings(cli, plan_scene, gate);
     // The grid of the scene, if there are no scans.
     let mut empty = None;
     if let Some(plan) = &plan {
         let noise = SceneNoise::new(plan, &*observer)?;
         settings.stride = args.stride.unwrap_or(noise.stride);
-        scans
-            .iter_mut()
-            .for_each(|scan| noise.give(&mut scan.map, scan.scans));
+        for scan in &mut scans {
+            noise.give(&mut scan.map, scan.scans);
+        }
         empty = scans.is_empty().then(|| noise.empty_scan(plan));
     }
-    let maps: Vec<ScanMap> = scans.iter().map(|scan| scan.map.clone()).collect();
-    let (found, mut calibration) =
-        test(&maps, &settings, &*observer).map_err(|error| match &scans[..] {
-            [only] => Error::Input {
-                path: only.path.clone(),
-                reason: error.to_string(),
-            },
-            _ => error,
-        })?;
+    let (found, mut calibration) = test_scans(&scans, &settings, &*observer)?;
     if let Some(empty) = empty {
-        calibration = Some(Calibration::new(
-            &empty.strided(settings.stride.0, settings.stride.1),
-            &settings,
-            &*observer,
-        )?);
+        let (lines, gates) = settings.stride;
+        let grid = empty.strided(lines, gates);
+        calibration = Some(Calibration::new(&grid, &settings, &*observer)?);
     }
-    let power = calibration
-        .map(|known| known.power(&settings, &*observer))
-        .transpose()?;
-    let none = || Provenance::new("", "", settings.seed);
-    let origin = scene.as_ref().map_or_else(none, SceneFile::provenance);
-    let holds = background(
-        &settings,
-        found.iter().all(|scan| scan.assumed_sigma_m_s.is_none()),
-    );
-    let mut text = notes.clone();
-    told(&scans, &found, power.as_ref(), &mut text);
-    text.push(format!("the rate of false alarms holds for {holds}\n"));
-    let object = json!({
-        "false_alarm": args.false_alarm, "background": holds,
-        "scans": scans.iter().zip(&found).map(as_json).collect::<Vec<_>>(),
-        "smallest_detectable_m2_s": power.as_ref().map(|power| power.smallest_m2_s.0),
-        "smallest_detectable_error_m2_s": power.as_ref().map(|power| power.smallest_error_m2_s),
-        "smallest_foretold_m2_s": power.as_ref().map(|power| power.smallest_m2_s.1),
-        "threshold": power.as_ref().map(|power| power.threshold),
-        "circulation_std_m2_s": power.as_ref().map(|power| power.circulation_std_m2_s),
-        "gumbel": power.as_ref().map(|power| [power.gumbel.0, power.gumbel.1]),
-        "notes": notes,
-    });
-    let tested = Some((&scans[..], &found[..], power.as_ref()));
-    let list = |files: &mut Outputs| list(args, tested, files);
-    args.folder.finish(
-        cli,
-        (Default::default(), origin),
-        list,
-        (object, text.join("\n")),
-    )
+    let power = match calibration {
+        Some(calibration) => Some(calibration.power(&settings, &*observer)?),
+        None => None,
+    };
+    let origin = match &scene {
+        Some(scene) => scene.provenance(),
+        None => Provenance::new("", "", settings.seed),
+    };
+    let result = Detections {
+        scans,
+        found,
+        power,
+        notes,
+    };
+    result.report(args, cli, &settings, origin)
+}
+
+/// Tests scans for wakes; an error of a single one names its file.
+fn test_scans(
+    scans: &[ReadScan],
+    settings: &DetectionSettings,
+    observer: &dyn Observer,
+) -> Result<(Vec<ScanDetection>, Option<Calibration>), Error> {
+    let maps: Vec<ScanMap> = scans.iter().map(|scan| scan.map.clone()).collect();
+    test(&maps, settings, observer).map_err(|error| match scans {
+        [only] => Error::input(&only.path, error.to_string()),
+        _ => error,
+    })
+}
+
+/// Scans, the results of their tests, and how often wakes are detected in scans like them.
+struct Detections {
+    scans: Vec<ReadScan>,
+    found: Vec<ScanDetection>,
+    power: Option<Power>,
+    notes: Vec<String>,
+}
+
+impl Detections {
+    /// Writes the files and prints the results.
+    fn report(
+        &self,
+        args: &DetectArgs,
+        cli: &Cli,
+        settings: &DetectionSettings,
+        origin: Provenance,
+    ) -> Result<(), Error> {
+        let mut found = self.found.iter();
+        let background = background(settings, found.all(|scan| scan.assumed_sigma_m_s.is_none()));
+        let mut lines = self.notes.clone();
+        self.add_lines(&mut lines);
+        lines.push(format!("the false-alarm rate holds for {background}\n"));
+        let mut scans = Vec::with_capacity(self.scans.len());
+        for (scan, found) in self.scans.iter().zip(&self.found) {
+            scans.push(scan_object(scan, found));
+        }
+        let power = self.power.as_ref();
+        let object = json!({
+            "false_alarm": args.false_alarm, "background": background, "scans": scans,
+            "smallest_detectable_m2_s": power.map(|power| power.smallest_m2_s.0),
+            "smallest_detectable_error_m2_s": power.map(|power| power.smallest_error_m2_s),
+            "smallest_foretold_m2_s": power.map(|power| power.smallest_m2_s.1),
+            "threshold": power.map(|power| power.threshold),
+            "circulation_std_m2_s": power.map(|power| power.circulation_std_m2_s),
+            "gumbel": power.map(|power| [power.gumbel.0, power.gumbel.1]),
+            "notes": self.notes,
+        });
+        args.folder.finish(
+            cli,
+            (Default::default(), origin),
+            |files| list(args, Some(self), files),
+            (object, lines.join("\n")),
+        )
+    }
+
+    /// Adds a description of the scans and of the wakes that are detected in scans like them.
+    fn add_lines(&self, lines: &mut Vec<String>) {
+        for (scan, found) in self.scans.iter().zip(&self.found) {
+            add_scan(scan, found, lines);
+        }
+        if let Some(power) = &self.power {
+            add_power(power, lines);
+        }
+    }
 }
 
 impl DetectArgs {
@@ -174,80 +216,71 @@ impl DetectArgs {
     }
 }
 
-/// Adds what people read of the scans and of the wakes that are found in scans like them.
-fn told(
-    scans: &[ReadScan],
-    found: &[ScanDetection],
-    power: Option<&Power>,
-    text: &mut Vec<String>,
-) {
-    for (scan, found) in scans.iter().zip(found) {
-        let verdict = if found.is_wake() { "wake" } else { "no wake" };
-        let statistic = found.statistic.value;
-        let threshold = found.threshold;
-        let rate = found.false_alarm;
-        let reached = if rate < 1e-12 {
-            "less than 1e-12".into()
-        } else {
-            digits(rate)
-        };
-        let mut line = format!(
-            "{} sweep {}: {verdict}; statistic {statistic:.1}, ",
-            scan.path.display(),
-            scan.sweep
-        );
-        line += &format!(
-            "threshold {threshold:.1}; an empty scan reaches it with probability {reached}"
-        );
-        text.push(line);
-        if let Some(sigma_m_s) = found.assumed_sigma_m_s {
-            text.push(format!(
-                "  no deviations are stated: {} m/s is taken for all",
-                digits(sigma_m_s)
-            ));
-        }
-        if found.is_correlated() {
-            let (along, across) = found.statistic.neighbour_correlation;
-            text.push(format!(
-                "  warning: neighbours are correlated, {along:.2} along the lines and {across:.2} across: this is not the background that \
-                 the rate holds for; state --turbulence, or --stride for lines and gates that share pulses"
-            ));
-        }
-    }
-    if let Some(power) = power {
-        let (mu, beta) = power.gumbel;
-        let (measured, foretold) = power.smallest_m2_s;
-        let threshold = power.threshold;
-        let rate = power.false_alarm;
-        let doubt = if (1.5..2.6).contains(&beta) {
-            ""
-        } else {
-            " (should be near 2: is the noise what was stated?)"
-        };
-        let law = format!("Gumbel's mu {mu:.2}, beta {beta:.2}{doubt}");
-        text.push(format!(
-            "threshold {threshold:.2} for {rate} false alarms a scan; {law}"
+/// Adds a description of the test of a scan.
+fn add_scan(scan: &ReadScan, found: &ScanDetection, lines: &mut Vec<String>) {
+    let verdict = if found.is_wake() { "wake" } else { "no wake" };
+    let statistic = found.statistic.value;
+    let threshold = found.threshold;
+    let rate = found.false_alarm;
+    let reached = if rate < 1e-12 {
+        "less than 1e-12".into()
+    } else {
+        digits(rate)
+    };
+    let mut line = format!(
+        "{} sweep {}: {verdict}; statistic {statistic:.1}, ",
+        scan.path.display(),
+        scan.sweep
+    );
+    line +=
+        &format!("threshold {threshold:.1}; an empty scan reaches it with probability {reached}");
+    lines.push(line);
+    if let Some(sigma_m_s) = found.assumed_sigma_m_s {
+        lines.push(format!(
+            "  no standard deviations are given: {} m/s is assumed for all velocities",
+            digits(sigma_m_s)
         ));
-        let error = power.smallest_error_m2_s;
-        let bound = power.circulation_std_m2_s;
-        let by_bound = format!("from the bound of {bound:.2} m^2/s: {foretold:.1}");
-        text.push(format!(
-            "circulation detected with probability 0.9: {measured:.1} +- {error:.1} m^2/s ({by_bound})"
+    }
+    if found.is_correlated() {
+        let (along, across) = found.statistic.neighbour_correlation;
+        lines.push(format!(
+            "  warning: neighbours are correlated, {along:.2} along the lines and {across:.2} across: this is not the background that \
+             the rate holds for; state --turbulence, or --stride for lines and gates that share pulses"
         ));
     }
 }
 
-/// Scans, what was found in them, how often wakes are found.
-type Tested<'t> = (&'t [ReadScan], &'t [ScanDetection], Option<&'t Power>);
+/// Adds the threshold and the smallest wake that is detected.
+fn add_power(power: &Power, lines: &mut Vec<String>) {
+    let (mu, beta) = power.gumbel;
+    let (measured, foretold) = power.smallest_m2_s;
+    let threshold = power.threshold;
+    let rate = power.false_alarm;
+    let doubt = if (1.5..2.6).contains(&beta) {
+        ""
+    } else {
+        " (should be near 2: is the noise what was stated?)"
+    };
+    let law = format!("Gumbel's mu {mu:.2}, beta {beta:.2}{doubt}");
+    lines.push(format!(
+        "threshold {threshold:.2} for {rate} false alarms a scan; {law}"
+    ));
+    let error = power.smallest_error_m2_s;
+    let bound = power.circulation_std_m2_s;
+    let by_bound = format!("from the bound of {bound:.2} m^2/s: {foretold:.1}");
+    lines.push(format!(
+        "circulation detected with probability 0.9: {measured:.1} +- {error:.1} m^2/s ({by_bound})"
+    ));
+}
 
-/// The files, whose content is not there before the tests.
-fn list(args: &DetectArgs, of: Option<Tested<'_>>, files: &mut Outputs) -> Result<(), Error> {
+/// The files; before the tests their names alone.
+fn list(args: &DetectArgs, result: Option<&Detections>, files: &mut Outputs) -> Result<(), Error> {
     if !args.data.is_empty() {
-        files.table("detection", of.as_ref(), |(scans, found, _)| {
-            Ok(scan_table(scans, found))
+        files.table("detection", result, |result| {
+            Ok(scan_table(&result.scans, &result.found))
         })?;
     }
-    let power = of.and_then(|(_, _, power)| power);
+    let power = result.and_then(|result| result.power.as_ref());
     files.table("detection_power", power, |power| {
         Ok(share_table(power, &power.found, true))
     })?;
@@ -261,19 +294,22 @@ fn list(args: &DetectArgs, of: Option<Tested<'_>>, files: &mut Outputs) -> Resul
     Ok(())
 }
 
-fn as_json((scan, found): (&ReadScan, &ScanDetection)) -> Value {
-    let vortex = |vortex: wakescope_estimate::vortex_fit::Vortex| {
-        let there = vortex.circulation_m2_s > 0.0;
-        there.then(|| json!({ "gamma_m2_s": vortex.circulation_m2_s, "y_m": vortex.lateral_position_m, "z_m": vortex.height_m }))
-    };
+fn scan_object(scan: &ReadScan, found: &ScanDetection) -> Value {
     let statistic = &found.statistic;
     json!({
         "file": scan.path.to_string_lossy(), "sweep": scan.sweep, "wake": found.is_wake(), "statistic": statistic.value,
-        "threshold": found.threshold, "false_alarm": found.false_alarm, "left": vortex(statistic.wake.left),
-        "right": vortex(statistic.wake.right), "gamma_std_m2_s": statistic.circulation_std_m2_s,
+        "threshold": found.threshold, "false_alarm": found.false_alarm, "left": vortex_object(statistic.wake.left),
+        "right": vortex_object(statistic.wake.right), "gamma_std_m2_s": statistic.circulation_std_m2_s,
         "chi2_per_dof": { "wind": statistic.wind_chi2_per_dof, "wake": statistic.wake_chi2_per_dof },
         "velocities": found.velocities, "outliers": found.outliers, "assumed_sigma_m_s": found.assumed_sigma_m_s,
         "neighbour_correlation": [statistic.neighbour_correlation.0, statistic.neighbour_correlation.1],
         "correlated": found.is_correlated(), "gumbel": [found.gumbel.0, found.gumbel.1],
+    })
+}
+
+/// A vortex; null without circulation.
+fn vortex_object(vortex: Vortex) -> Option<Value> {
+    (vortex.circulation_m2_s > 0.0).then(|| {
+        json!({ "gamma_m2_s": vortex.circulation_m2_s, "y_m": vortex.lateral_position_m, "z_m": vortex.height_m })
     })
 }

@@ -136,7 +136,7 @@ pub(super) fn case_file(
     }
 }
 
-/// Runs a case and says what came of it, on rank 0.
+/// Runs a case and prints its results, on rank 0.
 fn simulate(
     mut file: CaseFile,
     args: &RunArgs,
@@ -165,19 +165,16 @@ fn simulate(
             return Ok(());
         }
         let forecast = check_on(ranks, &file, args.out.as_deref(), options)?;
-        forecast
-            .notes
-            .iter()
-            .for_each(|text| cli.observer().warn(text));
+        for text in &forecast.notes {
+            cli.observer().warn(text);
+        }
         let mut object = json!(forecast);
         object["version"] = crate::VERSION.into();
         return cli.say(&object, &format!("good\n{forecast}"));
     }
     let Some(out) = &args.out else {
-        return Err(Error::Input {
-            path: "--out DIR".into(),
-            reason: "a run needs a folder to write to".into(),
-        });
+        let reason = "a run needs a folder to write to";
+        return Err(Error::input(Path::new("--out DIR"), reason));
     };
     let observer: Arc<dyn Observer> = if is_first {
         cli.observer()
@@ -194,16 +191,32 @@ fn simulate(
     }
     #[cfg(feature = "plots")]
     if outcome.is_complete && file.content.wake.is_some() {
-        match FinishedWake::read(out).and_then(|wake| wake.draw()) {
-            Ok(files) => outcome.files.extend(files),
-            // The run is done all the same.
-            Err(error) => {
-                let text = format!("the wake is not drawn: {error}");
-                cli.observer().warn(&text);
-                outcome.warnings.push(text);
-            }
+        draw(out, &mut outcome, cli);
+    }
+    report(&file, &outcome, ranks.count(), out, cli)
+}
+
+/// Draws a finished wake; a wake that cannot be drawn is a warning, as its run is complete.
+#[cfg(feature = "plots")]
+fn draw(folder: &Path, outcome: &mut FlowOutcome, cli: &Cli) {
+    match FinishedWake::read(folder).and_then(|wake| wake.draw()) {
+        Ok(files) => outcome.files.extend(files),
+        Err(error) => {
+            let text = format!("the wake is not drawn: {error}");
+            cli.observer().warn(&text);
+            outcome.warnings.push(text);
         }
     }
+}
+
+/// Prints the results of a run.
+fn report(
+    file: &CaseFile,
+    outcome: &FlowOutcome,
+    ranks: usize,
+    folder: &Path,
+    cli: &Cli,
+) -> Result<(), Error> {
     let FlowOutcome {
         steps,
         time_s,
@@ -212,14 +225,15 @@ fn simulate(
         relative_divergence,
         steps_wall_s,
         exchange_wall_s,
-        ..
+        files,
+        warnings,
     } = outcome;
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": steps, "time_s": time_s, "is_complete": is_complete,
         "kinetic_energy_m5_s2": kinetic_energy_m5_s2, "relative_divergence": relative_divergence, "steps_wall_s": steps_wall_s,
-        "exchange_wall_s": exchange_wall_s, "files": paths(&outcome.files), "warnings": outcome.warnings,
+        "exchange_wall_s": exchange_wall_s, "files": paths(files), "warnings": warnings,
     });
-    let state = if is_complete {
+    let state = if *is_complete {
         "done"
     } else {
         "paused, --restart continues it"
@@ -228,18 +242,13 @@ fn simulate(
         "{state}: step {steps}, t = {time_s:?} s, energy {kinetic_energy_m5_s2:.6e} m^5/s^2, "
     );
     text += &format!("relative divergence {relative_divergence:.1e}\n");
-    if ranks.count() > 1 {
+    if ranks > 1 {
         let share = 100.0 * exchange_wall_s / steps_wall_s;
         text += &format!("steps took {steps_wall_s:.1} s, {share:.1} % of it in turns and halos\n");
     }
-    cli.say(
-        &object,
-        &format!(
-            "{text}wrote {} files to {}",
-            outcome.files.len(),
-            out.display()
-        ),
-    )
+    let count = files.len();
+    text += &format!("wrote {count} files to {}", folder.display());
+    cli.say(&object, &text)
 }
 
 /// What Open MPI and MPICH (with its relatives) tell each process of their number.

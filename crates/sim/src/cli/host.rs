@@ -146,18 +146,16 @@ impl Cli {
 
     /// The text of a scene or a case: what the program that called has for its path, else that of the file.
     fn text(&self, path: &Path) -> Result<Cow<'_, str>, SceneError> {
-        let unreadable = |source| SceneError::Unreadable {
+        if let Some(call) = &self.call
+            && let Some(text) = call.host.texts.get(path)
+        {
+            return Ok(text.into());
+        }
+        let text = text_file::read(path).map_err(|source| SceneError::Unreadable {
             path: path.to_owned(),
             source,
-        };
-        match self
-            .call
-            .as_ref()
-            .and_then(|call| call.host.texts.get(path))
-        {
-            Some(text) => Ok(text.into()),
-            None => text_file::read(path).map(Cow::Owned).map_err(unreadable),
-        }
+        })?;
+        Ok(text.into())
     }
 
     /// The scene of a path, with the seed of the command line.

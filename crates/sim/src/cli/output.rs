@@ -65,13 +65,19 @@ pub(super) fn explain(error: &clap::Error, as_json: bool) -> u8 {
 pub(super) fn explained(error: &clap::Error) -> Value {
     let text = error.render().to_string();
     let text = text.trim_end().trim_start_matches("error: ");
-    let word = |kind| error.get(kind).map(ToString::to_string);
-    let problem = word(ContextKind::InvalidArg).map(|key| {
+    let mut problems = Vec::new();
+    if let Some(key) = error.get(ContextKind::InvalidArg) {
+        let value = error
+            .get(ContextKind::InvalidValue)
+            .map(ToString::to_string);
         // What the reader of the value says is less than the whole text.
-        let allowed = std::error::Error::source(error).map_or_else(|| text.to_owned(), ToString::to_string);
-        json!({ "file": null, "line": null, "key": key, "value": word(ContextKind::InvalidValue), "allowed": allowed })
-    });
-    json!({ "error": text, "problems": problem.into_iter().collect::<Vec<Value>>() })
+        let allowed =
+            std::error::Error::source(error).map_or_else(|| text.to_owned(), ToString::to_string);
+        problems.push(
+            json!({ "file": null, "line": null, "key": key.to_string(), "value": value, "allowed": allowed }),
+        );
+    }
+    json!({ "error": text, "problems": problems })
 }
 
 /// An error as an object: the whole message, and each problem with its file, line, key, value and what is allowed.
@@ -80,38 +86,39 @@ pub(super) fn as_object(error: &Error) -> Value {
 }
 
 fn problems(error: &Error) -> Vec<Value> {
-    let object = |file: &Path, line: Option<usize>, [key, value]: [Value; 2], allowed: &str| json!({ "file": file.to_string_lossy(), "line": line, "key": key, "value": value, "allowed": allowed });
-    let problem =
-        |file: &Path, line, allowed: &str| object(file, line, [Value::Null, Value::Null], allowed);
     match error {
         Error::Scene(SceneError::Invalid { path, problems }) => {
-            let of = |Located { problem, line }: &Located| {
-                object(
-                    path,
-                    *line,
-                    [json!(problem.key), json!(problem.value)],
-                    &problem.allowed,
-                )
-            };
-            problems.iter().map(of).collect()
+            let mut objects = Vec::with_capacity(problems.len());
+            for Located { problem, line } in problems {
+                let mut object = problem_object(path, *line, &problem.allowed);
+                object["key"] = json!(problem.key);
+                object["value"] = json!(problem.value);
+                objects.push(object);
+            }
+            objects
         }
         Error::Scene(SceneError::Malformed {
             path,
             line,
             message,
-        }) => vec![problem(path, Some(*line), message)],
-        Error::Input { path, reason } => vec![problem(path, None, reason)],
+        }) => vec![problem_object(path, Some(*line), message)],
+        Error::Input { path, reason } => vec![problem_object(path, None, reason)],
         Error::Scene(SceneError::Unreadable { path, source }) | Error::Io { path, source, .. } => {
-            vec![problem(path, None, &source.to_string())]
+            vec![problem_object(path, None, &source.to_string())]
         }
         Error::Case { source, .. } => problems(source),
         Error::OfKey { key, source } => {
             let mut found = problems(source);
-            found
-                .iter_mut()
-                .for_each(|problem| problem["key"] = json!(key));
+            for problem in &mut found {
+                problem["key"] = json!(key);
+            }
             found
         }
         _ => Vec::new(),
     }
+}
+
+/// A problem of a file without a key.
+fn problem_object(file: &Path, line: Option<usize>, allowed: &str) -> Value {
+    json!({ "file": file.to_string_lossy(), "line": line, "key": null, "value": null, "allowed": allowed })
 }

@@ -152,41 +152,39 @@ impl RetrieveArgs {
 
     /// A scene with what is stated, else with what the file says, else with the defaults, at a high signal-to-noise ratio.
     fn stated_scene(&self, scan: &ReadScan) -> Result<SceneFile, Error> {
-        let mut text =
-            String::from("detector.snr.reference = \"fixed\"\ndetector.snr.snr_db = 10.0\n");
-        let mut state = |key: &str, value: Option<String>| {
-            text.extend(value.map(|value| format!("{key} = {value}\n")));
-        };
-        let word = |word: &str| Some(format!("{word:?}"));
-        let number = |value: f64| Some(format!("{value:?}"));
-        state(
-            "pulse.shape.duration_s",
-            scan.pulse_width_s.and_then(number),
-        );
+        let mut keys = vec![
+            ("detector.snr.reference", "\"fixed\"".to_owned()),
+            ("detector.snr.snr_db", "10.0".to_owned()),
+        ];
+        if let Some(width_s) = scan.pulse_width_s {
+            keys.push(("pulse.shape.duration_s", format!("{width_s:?}")));
+        }
         if let Some(method) = &self.estimator {
-            let gate_s = scan
-                .gate_length_m
-                .map(|length_m| 2.0 * length_m / SPEED_OF_LIGHT_M_S);
-            let samples =
-                |seconds: f64| Some(((seconds * WIDE_HZ).round().max(1.0) as u64).to_string());
-            state("estimator.method.kind", word(method));
-            state(
-                "estimator.window_samples",
-                self.window.or(gate_s).and_then(samples),
-            );
-            state(
-                "estimator.weighting",
-                word(self.weighting.as_deref().unwrap_or("rectangular")),
-            );
+            keys.push(("estimator.method.kind", format!("{method:?}")));
+            let gate_length_m = scan.gate_length_m;
+            let gate_s = gate_length_m.map(|length_m| 2.0 * length_m / SPEED_OF_LIGHT_M_S);
+            if let Some(window_s) = self.window.or(gate_s) {
+                let samples = (window_s * WIDE_HZ).round().max(1.0) as u64;
+                keys.push(("estimator.window_samples", samples.to_string()));
+            }
+            let weighting = self.weighting.as_deref().unwrap_or("rectangular");
+            keys.push(("estimator.weighting", format!("{weighting:?}")));
             // Gates of one line each, and a band that is wide enough for all instruments.
-            state(
-                Estimator::RADIUS,
-                number(0.0).filter(|_| method != "periodogram"),
-            );
-            state("estimator.padded_samples", Some("4096".into()));
-            state("detector.sampling_hz", number(WIDE_HZ));
-            state("detector.intermediate_frequency_hz", number(0.25 * WIDE_HZ));
-            state("detector.bandwidth_hz", number(0.4 * WIDE_HZ));
+            if method != "periodogram" {
+                keys.push((Estimator::RADIUS, "0.0".to_owned()));
+            }
+            keys.push(("estimator.padded_samples", "4096".to_owned()));
+            for (key, value_hz) in [
+                ("detector.sampling_hz", WIDE_HZ),
+                ("detector.intermediate_frequency_hz", 0.25 * WIDE_HZ),
+                ("detector.bandwidth_hz", 0.4 * WIDE_HZ),
+            ] {
+                keys.push((key, format!("{value_hz:?}")));
+            }
+        }
+        let mut text = String::new();
+        for (key, value) in keys {
+            text += &format!("{key} = {value}\n");
         }
         Ok(SceneFile::parse(
             &text,
@@ -337,18 +335,17 @@ impl Input {
 
 /// Where the track of the scans of its plane says that the wake of a scan is, to start from beside the blind search.
 fn prediction(before: &[RetrievedScan], scan: &ReadScan) -> Option<Wake> {
-    let own = || {
-        before
-            .iter()
-            .filter(|one| are_of_one_plane(&one.scan, scan))
-    };
-    let last = own().next_back()?;
+    let mut same_plane = Vec::new();
+    for one in before {
+        if are_of_one_plane(&one.scan, scan) {
+            same_plane.push(&one.result);
+        }
+    }
+    let last = same_plane.last()?;
     let time_s = Some(scan.map.middle_s()).filter(|time_s| time_s.is_finite())?;
-    let core_m = last.result.wake.map_or(2.0, |wake| wake.left.core_radius_m);
-    retrieve::track_of(own().map(|one| &one.result))
-        .ok()
-        .flatten()?
-        .prediction(time_s, core_m)
+    let core_m = last.wake.map_or(2.0, |wake| wake.left.core_radius_m);
+    let track = retrieve::track_of(same_plane.iter().copied());
+    track.ok()??.prediction(time_s, core_m)
 }
 
 /// The word for velocities that are means over the gates.
@@ -519,8 +516,7 @@ fn list(
         }
         let count = planes.iter().max().map_or(1, |last| last + 1);
         for plane in 0..count {
-            let of_plane = |track: &&PlaneTrack| track.plane == plane;
-            let track = tracks.and_then(|tracks| tracks.iter().find(of_plane));
+            let track = tracks.and_then(|tracks| tracks.iter().find(|track| track.plane == plane));
             let name = match count {
                 1 => "track".to_owned(),
                 _ => format!("track_{:03}", plane + 1),

@@ -14,24 +14,14 @@ use wakescope_optics::EfficiencyProfile;
 /// Signal-to-noise ratio and efficiency against range, each with its standard error as a band.
 pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
     let e = &profile.efficiency;
-    let range = || Axis::linear("range [m]");
-    let points = |y: &[f64]| {
-        e.range_m
-            .iter()
-            .copied()
-            .zip(y.iter().copied())
-            .collect::<Vec<_>>()
-    };
-    let curve = |label: &str, style: Style, profile: &EfficiencyProfile| {
-        let series = Series::new(label, style, points(&profile.mean));
-        match has_error(profile) {
-            true => series.with_band(&profile.standard_error),
-            false => series,
-        }
-    };
-    let mut efficiency = CurvePlot::new("System efficiency", range(), Axis::linear("efficiency"));
+    let range = Axis::linear("range [m]");
+    let mut efficiency = CurvePlot::new(
+        "System efficiency",
+        range.clone(),
+        Axis::linear("efficiency"),
+    );
     if profile.others.is_empty() {
-        efficiency = efficiency.with(curve("", Style::Line, e));
+        efficiency = efficiency.with(efficiency_curve("", Style::Line, &e.range_m, e));
     }
     let styles = [Style::Line, Style::Dash, Style::DashDot, Style::Dot];
     for ((name, other), style) in profile.others.iter().zip(styles) {
@@ -40,14 +30,14 @@ pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
             .replace("efficiency_", "")
             .replace('_', " ")
             .replace("monte carlo", "Monte Carlo");
-        efficiency = efficiency.with(curve(&label, style, other));
+        efficiency = efficiency.with(efficiency_curve(&label, style, &e.range_m, other));
     }
-    let mut snr = Series::new("", Style::Line, points(&profile.snr_db));
+    let mut snr = Series::new("", Style::Line, points(&e.range_m, &profile.snr_db));
     let is_fixed = matches!(plan.scene().detector.snr, SnrReference::Fixed { .. });
     if has_error(e) && !is_fixed {
         snr.band = Some(snr_band_db(profile));
     }
-    let snr = CurvePlot::new("Signal-to-noise ratio", range(), Axis::linear("SNR [dB]")).with(snr);
+    let snr = CurvePlot::new("Signal-to-noise ratio", range, Axis::linear("SNR [dB]")).with(snr);
     let figure = Figure::side_by_side([snr, efficiency].map(|plot| CurvePlot {
         shape: 0.75,
         ..plot
@@ -65,12 +55,33 @@ fn has_error(profile: &EfficiencyProfile) -> bool {
 /// The ratio with an efficiency one standard error below and above its mean: the ratio is in proportion to it.
 fn snr_band_db(profile: &RangeProfile) -> Vec<(f64, f64)> {
     let e = &profile.efficiency;
-    let all = profile.snr_db.iter().zip(&e.mean).zip(&e.standard_error);
-    all.map(|((snr_db, mean), error)| {
-        let off_db = |sign: f64| 10.0 * (1.0 + sign * error / mean).max(1e-3).log10();
-        (snr_db + off_db(-1.0), snr_db + off_db(1.0))
-    })
-    .collect()
+    let mut band = Vec::with_capacity(profile.snr_db.len());
+    for (index, snr_db) in profile.snr_db.iter().enumerate() {
+        let relative = e.standard_error[index] / e.mean[index];
+        let below_db = 10.0 * (1.0 - relative).max(1e-3).log10();
+        let above_db = 10.0 * (1.0 + relative).max(1e-3).log10();
+        band.push((snr_db + below_db, snr_db + above_db));
+    }
+    band
+}
+
+/// Points of a curve.
+fn points(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
+    x.iter().copied().zip(y.iter().copied()).collect()
+}
+
+/// An efficiency against range, with its standard error as a band if it has one.
+fn efficiency_curve(
+    label: &str,
+    style: Style,
+    range_m: &[f64],
+    efficiency: &EfficiencyProfile,
+) -> Series {
+    let series = Series::new(label, style, points(range_m, &efficiency.mean));
+    match has_error(efficiency) {
+        true => series.with_band(&efficiency.standard_error),
+        false => series,
+    }
 }
 
 /// The air, one scan of it and the mean of all; below them the errors. One scan alone has its error beside it.
@@ -96,39 +107,42 @@ pub(super) fn map(
     if let Some(winds) = winds {
         return Ok(azimuth_display(plan, map, winds));
     }
-    let panel = |field: &str, title: &str| -> Result<MapPlot, Error> {
+    let realisations = plan.scene().scan.realisations;
+    let mean = format!("mean of {realisations} realisations");
+    let titles = match realisations {
+        1 => vec![
+            ("v_exact", "exact field"),
+            ("v_scan", "one scan, estimated"),
+            ("bias", "its error"),
+        ],
+        _ => vec![
+            ("v_exact", "exact field"),
+            ("v_scan", "one scan, estimated"),
+            ("radial_velocity", &mean),
+            ("bias", "mean error (bias)"),
+            (
+                "velocity_standard_deviation",
+                "standard deviation of one scan",
+            ),
+            ("rms", "root mean square error"),
+        ],
+    };
+    let mut panels: Vec<MapPlot> = Vec::with_capacity(titles.len());
+    for (field, title) in titles {
         let mut plot = MapPlot::new(map, sweep, field)?
             .titled(title)
             .labelled("m/s");
         if !plot.from_above {
             plot.points_m.clone_from(&centres_m);
         }
-        Ok(plot)
-    };
-    let realisations = plan.scene().scan.realisations;
-    let exact = panel("v_exact", "exact field")?;
-    let colours = exact.colours;
-    let scan = panel("v_scan", "one scan, estimated")?.coloured(colours);
-    let panels = if realisations == 1 {
-        vec![exact, scan, panel("bias", "its error")?]
-    } else {
-        let mean = panel(
-            "radial_velocity",
-            &format!("mean of {realisations} realisations"),
-        )?
-        .coloured(colours);
-        vec![
-            exact,
-            scan,
-            mean,
-            panel("bias", "mean error (bias)")?,
-            panel(
-                "velocity_standard_deviation",
-                "standard deviation of one scan",
-            )?,
-            panel("rms", "root mean square error")?,
-        ]
-    };
+        // Estimates have the colours of the exact field.
+        if let Some(exact) = panels.first()
+            && ["v_scan", "radial_velocity"].contains(&field)
+        {
+            plot = plot.coloured(exact.colours);
+        }
+        panels.push(plot);
+    }
     let has_gaps = panels
         .iter()
         .any(|plot| plot.cells.values.iter().any(|v| v.is_nan()));
@@ -141,22 +155,22 @@ pub(super) fn map(
 
 /// The first scan of recorded signals: velocity, its predicted error, signal-to-noise ratio.
 pub(super) fn measured(map: &VelocityMap) -> Result<Figure, Error> {
-    let panel = |field: &str, title: &str, unit: &str| -> Result<MapPlot, Error> {
-        Ok(MapPlot::new(map, 0, field)?.titled(title).labelled(unit))
-    };
-    let panels = vec![
-        panel(
+    let mut panels = Vec::new();
+    for (field, title, unit) in [
+        (
             "radial_velocity",
             "radial velocity, positive away from the lidar",
             "m/s",
-        )?,
-        panel(
+        ),
+        (
             "velocity_standard_deviation",
             "predicted standard deviation",
             "m/s",
-        )?,
-        panel("signal_to_noise_ratio", "signal-to-noise ratio", "dB")?,
-    ];
+        ),
+        ("signal_to_noise_ratio", "signal-to-noise ratio", "dB"),
+    ] {
+        panels.push(MapPlot::new(map, 0, field)?.titled(title).labelled(unit));
+    }
     let figure = Figure::stacked(panels).titled("One scan of recorded signals; grey: no value");
     Ok(Figure {
         columns: 3,
@@ -243,54 +257,66 @@ const DRAWN_LINES: usize = 24;
 
 /// The set-up, from above and from behind: the lidar, each line from the first gate to the last, the ground and the vortices.
 pub(super) fn scan(plan: &Plan) -> Figure {
-    let g = &plan.geometry;
-    let start_m = plan.geometry.schedule.mount.position_m;
-    let ends = [g.gate_range_m.first(), g.gate_range_m.last()].map(|r| r.copied().unwrap_or(0.0));
-    let lines = g.schedule.lines.len();
-    // Along the flight, vortices and ground are drawn a little beyond the lidar and the farthest gates.
-    let spread_m = |axis: usize, least_m: f64| {
-        let drawn = (0..lines).map(|line| g.schedule.middle(line).at_range_m(ends[1])[axis]);
-        let with = |[low, high]: [f64; 2], at_m: f64| [low.min(at_m), high.max(at_m)];
-        drawn.fold([start_m[axis] - least_m, start_m[axis] + least_m], with)
-    };
-    let x_m = spread_m(0, 0.2 * ends[1]);
-    let y_m = spread_m(1, 0.0);
-    let panel = |title: &str, label: &str, up: usize| {
-        let mut plot = CurvePlot::new(
-            title,
-            Axis::linear("across the flight [m]"),
-            Axis::linear(label),
-        );
-        plot.equal_scales = true;
-        for line in (0..lines).step_by(lines.div_ceil(DRAWN_LINES).max(1)) {
-            let beam = g.schedule.middle(line);
-            let points = ends
-                .map(|range_m| beam.at_range_m(range_m))
-                .map(|p| (p[1], p[up]));
-            plot = plot.with(Series::new("", Style::Line, points).in_colour(0));
-        }
-        let vortices = centres_m(plan);
-        for (number, (centre_m, height_m)) in vortices.into_iter().enumerate() {
-            let label = if number == 0 { "vortices" } else { "" };
-            plot = plot.with(match up {
-                2 => Series::new(label, Style::Markers, [(centre_m, height_m)]).in_colour(1),
-                _ => Series::new(label, Style::Dash, x_m.map(|x_m| (centre_m, x_m))).in_colour(1),
-            });
-        }
-        if up == 2 {
-            plot = plot
-                .with(Series::new("ground", Style::Line, y_m.map(|y_m| (y_m, 0.0))).in_colour(3));
-        }
-        plot.with(Series::new("lidar", Style::Markers, [(start_m[1], start_m[up])]).in_colour(2))
-    };
     let panels = [
-        panel("from above", "along the flight [m]", 0),
-        panel("from behind", "height [m]", 2),
+        set_up_panel(plan, "from above", "along the flight [m]", 0),
+        set_up_panel(plan, "from behind", "height [m]", 2),
     ];
     Figure {
         width: 1120.0,
         ..Figure::side_by_side(panels).titled(&plan.schedule().to_string())
     }
+}
+
+/// The set-up with one axis (0 along the flight, 2 up) over the axis across the flight.
+fn set_up_panel(plan: &Plan, title: &str, label: &str, axis: usize) -> CurvePlot {
+    let g = &plan.geometry;
+    let start_m = g.schedule.mount.position_m;
+    let near_m = g.gate_range_m.first().copied().unwrap_or(0.0);
+    let far_m = g.gate_range_m.last().copied().unwrap_or(0.0);
+    let lines = g.schedule.lines.len();
+    let mut plot = CurvePlot::new(
+        title,
+        Axis::linear("across the flight [m]"),
+        Axis::linear(label),
+    );
+    plot.equal_scales = true;
+    for line in (0..lines).step_by(lines.div_ceil(DRAWN_LINES).max(1)) {
+        let beam = g.schedule.middle(line);
+        let ends_m = [near_m, far_m].map(|range_m| beam.at_range_m(range_m));
+        let points = ends_m.map(|end_m| (end_m[1], end_m[axis]));
+        plot = plot.with(Series::new("", Style::Line, points).in_colour(0));
+    }
+    // Along the flight, vortices are drawn a little beyond the lidar and the farthest gates.
+    let x_m = drawn_m(plan, 0, 0.2 * far_m);
+    for (number, (centre_m, height_m)) in centres_m(plan).into_iter().enumerate() {
+        let label = if number == 0 { "vortices" } else { "" };
+        let vortex = match axis {
+            2 => Series::new(label, Style::Markers, [(centre_m, height_m)]),
+            _ => Series::new(label, Style::Dash, x_m.map(|x_m| (centre_m, x_m))),
+        };
+        plot = plot.with(vortex.in_colour(1));
+    }
+    if axis == 2 {
+        let ground = drawn_m(plan, 1, 0.0).map(|y_m| (y_m, 0.0));
+        plot = plot.with(Series::new("ground", Style::Line, ground).in_colour(3));
+    }
+    let lidar = [(start_m[1], start_m[axis])];
+    plot.with(Series::new("lidar", Style::Markers, lidar).in_colour(2))
+}
+
+/// Range of a coordinate in which lines are drawn, at least so far from the lidar \[m\].
+fn drawn_m(plan: &Plan, axis: usize, least_m: f64) -> [f64; 2] {
+    let g = &plan.geometry;
+    let start_m = g.schedule.mount.position_m[axis];
+    let far_m = g.gate_range_m.last().copied().unwrap_or(0.0);
+    let mut low_m = start_m - least_m;
+    let mut high_m = start_m + least_m;
+    for line in 0..g.schedule.lines.len() {
+        let end_m = g.schedule.middle(line).at_range_m(far_m)[axis];
+        low_m = low_m.min(end_m);
+        high_m = high_m.max(end_m);
+    }
+    [low_m, high_m]
 }
 
 /// What is shown, of which age and from how many realisations.
