@@ -31,11 +31,7 @@ pub(crate) fn scene<'py>(
             let allowed = format!("one of {}", known.join(", "));
             raised(
                 py,
-                &Refusal::of(Problem {
-                    key: "preset".into(),
-                    value: name.into(),
-                    allowed,
-                }),
+                &Refusal::of(Problem::new("preset", name, allowed)),
             )
         })?,
     };

@@ -1,7 +1,7 @@
 //! A checked scene or case, with its file, its hash and the lines of its keys.
 
 use crate::io::{Provenance, hash_of, text_file};
-use crate::keys::{Located, Problem, SceneError, Text};
+use crate::keys::{Problem, SceneError, Text};
 use std::path::{Path, PathBuf};
 
 /// What a file says: a scene or a case.
@@ -102,13 +102,6 @@ impl<T: Content> Document<T> {
 
     /// Problems of what was asked for beside the file.
     pub(crate) fn refused(&self, problems: Vec<Problem>) -> SceneError {
-        let problems = problems
-            .into_iter()
-            .map(|problem| Located {
-                problem,
-                line: None,
-            })
-            .collect();
         SceneError::Invalid {
             path: self.path.clone(),
             problems,

@@ -11,7 +11,7 @@ use crate::Error;
 use crate::flow::{CaseFile, WakePreset};
 use crate::io::raw::RawRecords;
 use crate::io::{Existing, Provenance, text_file, write_atomic};
-use crate::keys::{Located, Problem, SceneError};
+use crate::keys::{Problem, SceneError};
 use crate::outputs::{self, List, Outputs};
 use crate::progress::{Observer, stoppable};
 use crate::scene::{Outputs as Formats, SceneFile};
@@ -56,14 +56,10 @@ pub struct Refusal(pub Value);
 impl Refusal {
     /// For a value that is not allowed.
     pub fn of(problem: Problem) -> Self {
-        let problems = vec![Located {
-            problem,
-            line: None,
-        }];
         Self(as_object(
             &SceneError::Invalid {
                 path: "scene".into(),
-                problems,
+                problems: vec![problem],
             }
             .into(),
         ))
@@ -73,7 +69,9 @@ impl Refusal {
 /// The refusal of an error; without `lines` where nobody wrote the text that has them.
 pub fn refusal(mut error: Error, lines: bool) -> Refusal {
     if let (Error::Scene(SceneError::Invalid { problems, .. }), false) = (&mut error, lines) {
-        problems.iter_mut().for_each(|located| located.line = None);
+        for problem in problems {
+            problem.line = None;
+        }
     }
     Refusal(as_object(&error))
 }

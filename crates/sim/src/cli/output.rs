@@ -1,7 +1,7 @@
 //! What the program prints: results to standard output, errors to standard error, as text or as JSON.
 
 use crate::Error;
-use crate::scene::{Located, SceneError};
+use crate::scene::SceneError;
 use clap::error::ContextKind;
 use serde_json::{Value, json};
 use std::io::{ErrorKind, Write as _};
@@ -89,8 +89,8 @@ fn problems(error: &Error) -> Vec<Value> {
     match error {
         Error::Scene(SceneError::Invalid { path, problems }) => {
             let mut objects = Vec::with_capacity(problems.len());
-            for Located { problem, line } in problems {
-                let mut object = problem_object(path, *line, &problem.allowed);
+            for problem in problems {
+                let mut object = problem_object(path, problem.line, &problem.allowed);
                 object["key"] = json!(problem.key);
                 object["value"] = json!(problem.value);
                 objects.push(object);

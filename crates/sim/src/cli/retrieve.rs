@@ -211,14 +211,14 @@ pub(super) fn retrieve(args: &RetrieveArgs, cli: &Cli) -> Result<(), Error> {
         .transpose()?;
     let observer = cli.observer();
     let mut inputs = each_usable(&args.data, &*observer, |path| {
-        Input::read(args, path, stated.as_ref(), &*observer)
+        read_input(args, path, stated.as_ref(), &*observer)
     })?;
     for input in &inputs {
-        input.refuse_idle(args, cli)?;
+        refuse_beside_own_scene(input, args, cli)?;
     }
     let mut scans: Vec<&mut ReadScan> = Vec::new();
-    for input in &mut inputs {
-        scans.extend(&mut input.scans.maps);
+    for (input, _) in &mut inputs {
+        scans.extend(&mut input.maps);
     }
     face_alike(&mut scans);
     for path in share_origin(&mut scans) {
@@ -230,7 +230,7 @@ pub(super) fn retrieve(args: &RetrieveArgs, cli: &Cli) -> Result<(), Error> {
     let planes = plane_numbers(scans.iter().map(|scan| &**scan));
     args.folder
         .prepare(cli, |files| list(args.method, &planes, None, files))?;
-    let scenes: Vec<_> = inputs.iter().map(|input| input.scene.clone()).collect();
+    let scenes: Vec<_> = inputs.iter().map(|(_, scene)| scene.clone()).collect();
     observer.begin(Stage::Retrieval, planes.len() as u64);
     let mut found = of_inputs(args, inputs, planes.len(), &*observer)?;
     observer.end();
@@ -260,7 +260,7 @@ fn of_inputs(
 ) -> Result<Found, Error> {
     let mut found = Found::default();
     let mut refused = None;
-    for Input { scans, scene } in inputs {
+    for (scans, scene) in inputs {
         if let Some(signals) = scans.signals {
             of_signals(args, scans.maps, signals, &mut found, observer)?;
             continue;
@@ -285,52 +285,46 @@ fn of_inputs(
 }
 
 /// A file, and the scene of its scans where one is known.
-struct Input {
-    scans: Scans,
-    scene: Option<SceneFile>,
+type Input = (Scans, Option<SceneFile>);
+
+/// Refuses options in whose place the scene of the file is taken.
+fn refuse_beside_own_scene(
+    (scans, scene): &Input,
+    args: &RetrieveArgs,
+    cli: &Cli,
+) -> Result<(), Error> {
+    let states_estimator = args.estimator.as_deref().is_some_and(|name| name != MEANS);
+    match scans.maps.first() {
+        Some(scan) if scene.is_some() && !states_estimator => {
+            cli.refuse_idle(&scan.path, BESIDE_OWN_SCENE)
+        }
+        _ => Ok(()),
+    }
 }
 
-impl Input {
-    /// Refuses options in whose place the scene of the file is taken.
-    fn refuse_idle(&self, args: &RetrieveArgs, cli: &Cli) -> Result<(), Error> {
-        let states_estimator = args.estimator.as_deref().is_some_and(|name| name != MEANS);
-        match self.scans.maps.first() {
-            Some(scan) if self.scene.is_some() && !states_estimator => {
-                cli.refuse_idle(&scan.path, BESIDE_OWN_SCENE)
-            }
-            _ => Ok(()),
-        }
+fn read_input(
+    args: &RetrieveArgs,
+    path: &Path,
+    stated: Option<&SceneFile>,
+    observer: &dyn Observer,
+) -> Result<Input, Error> {
+    if matches!(args.method, Method::Signals | Method::Envelope) && !is_signals(path) {
+        let reason =
+            "it is no file of raw signals, which this method needs: --method fit takes maps";
+        return Err(Error::input(path, reason));
     }
-
-    fn read(
-        args: &RetrieveArgs,
-        path: &Path,
-        stated: Option<&SceneFile>,
-        observer: &dyn Observer,
-    ) -> Result<Self, Error> {
-        if matches!(args.method, Method::Signals | Method::Envelope) && !is_signals(path) {
-            let reason =
-                "it is no file of raw signals, which this method needs: --method fit takes maps"
-                    .into();
-            return Err(Error::Input {
-                path: path.to_owned(),
-                reason,
-            });
-        }
-        let keeps_spectra = args.method == Method::Envelope;
-        let scans = args.scans.read(path, stated, keeps_spectra, observer)?;
-        let known = scans.signals.as_ref().map(|signals| &signals.plan.file);
-        let scene = match (known.or(stated), scans.maps.first()) {
-            (Some(scene), _) => Some(scene.clone()),
-            (None, Some(scan)) => retrieve::scene_of(scan, observer)?,
-            (None, None) => None,
-        };
-        scans
-            .left_out
-            .iter()
-            .for_each(|text| observer.warn(&format!("{}: {text}", path.display())));
-        Ok(Self { scans, scene })
+    let keeps_spectra = args.method == Method::Envelope;
+    let scans = args.scans.read(path, stated, keeps_spectra, observer)?;
+    let known = scans.signals.as_ref().map(|signals| &signals.plan.file);
+    let scene = match (known.or(stated), scans.maps.first()) {
+        (Some(scene), _) => Some(scene.clone()),
+        (None, Some(scan)) => retrieve::scene_of(scan, observer)?,
+        (None, None) => None,
+    };
+    for text in &scans.left_out {
+        observer.warn(&format!("{}: {text}", path.display()));
     }
+    Ok((scans, scene))
 }
 
 /// Where the track of the scans of its plane says that the wake of a scan is, to start from beside the blind search.

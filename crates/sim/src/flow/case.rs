@@ -229,11 +229,11 @@ impl FlowCase {
                 "at least {:?}, for at most {MAX_OUTPUTS} outputs",
                 end_s / MAX_OUTPUTS as f64
             );
-            return Err(Problem {
-                key: "output.every_s".into(),
-                value: format!("{every_s:?}"),
+            return Err(Problem::new(
+                "output.every_s",
+                format!("{every_s:?}"),
                 allowed,
-            });
+            ));
         }
         // The last multiple may be the end but for rounding.
         let mut times_s: Vec<f64> = (0..=(count + 1e-6).floor() as usize)

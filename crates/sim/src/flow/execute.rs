@@ -5,7 +5,7 @@
 use super::files::{Files, agree, checkpoint_paths};
 use super::forecast::{FlowForecast, refuse_too_large};
 use super::setup::{Setup, WakeSetup};
-use super::wake::{Schedule, WakeRun};
+use super::wake::{WakeRun, plain_schedule, wake_schedule};
 use super::writer::{DIVISIONS, Writer, growth_note};
 use super::{Begin, CaseFile, FlowCase, FlowOutcome, age_tau};
 use crate::io::Existing;
@@ -365,14 +365,15 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
     let schedule = match (&case.wake, &setup.wake) {
         (Some(wake), Some(WakeSetup { scales, .. })) => {
             output.planes_x_m = wake.planes_x.iter().map(|x| x * scales.spacing_m).collect();
-            Schedule::of_wake(wake, setup.tau_per_s, end_s)
+            wake_schedule(wake, setup.tau_per_s, end_s)
         }
-        _ => Schedule::plain(
+        _ => plain_schedule(
             case.output_times_s(end_s)
                 .map_err(|problem| Error::Scene(file.located(vec![problem])))?,
         ),
     };
-    if let Some(late) = schedule.times_s.iter().find(|t| **t > end_s) {
+    let output_times_s: Vec<f64> = schedule.iter().map(|due| due.time_s).collect();
+    if let Some(late) = output_times_s.iter().find(|t| **t > end_s) {
         return Err(file.refuse(
             "output.times_s",
             late,
@@ -394,7 +395,7 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
     let [path, _] = checkpoint_paths(folder);
     let run = RunPlan {
         end_s,
-        output_times_s: schedule.times_s.clone(),
+        output_times_s,
         checkpoint: case
             .checkpoint
             .write
@@ -420,11 +421,11 @@ fn end_s(file: &CaseFile, setup: &Setup) -> Result<f64, Error> {
     let wake_end_s = wake.map(|wake| wake.end_tau / setup.tau_per_s);
     let end_s = case.time.end_s.or(wake_end_s).or(setup.end_s);
     end_s.ok_or_else(|| {
-        let problem = Problem {
-            key: "time.end_s".into(),
-            value: Problem::ABSENT.into(),
-            allowed: "a number in s, e.g. 30.0, is required for a flow with kind = \"free\"".into(),
-        };
+        let problem = Problem::new(
+            "time.end_s",
+            Problem::ABSENT,
+            "a number in s, e.g. 30.0, is required for a flow with kind = \"free\"",
+        );
         Error::Scene(file.located(vec![problem]))
     })
 }

@@ -7,7 +7,7 @@
 
 use super::Begin;
 use super::case::{FileFormat, Output};
-use super::wake::{self, Due, Schedule};
+use super::wake::{self, Due};
 use crate::Error;
 use crate::io::cf_planes::cf_planes_bytes;
 use crate::io::{
@@ -72,7 +72,8 @@ pub(super) struct Files {
     pub(super) folder: PathBuf,
     pub(super) output: Output,
     pub(super) origin: Provenance,
-    pub(super) schedule: Schedule,
+    /// The output times and what is due at each.
+    pub(super) schedule: Vec<Due>,
     /// Whether a wake is recorded; fields then have the vorticity, too.
     pub(super) is_wake: bool,
     /// Age of the wake per time \[1/s\].
@@ -116,10 +117,7 @@ impl Files {
     }
 
     fn of_outputs(&self) -> impl Iterator<Item = OutputFile> {
-        self.schedule
-            .due
-            .iter()
-            .flat_map(|due| self.of_output(*due))
+        self.schedule.iter().flat_map(|due| self.of_output(*due))
     }
 
     /// Names of all files of a run, but for its checkpoints.
@@ -160,7 +158,7 @@ impl Files {
         let tables = usize::from(self.output.steps);
         add_files(&mut out, STEPS, tables, steps * STEP_ROW_BYTES);
         let histories = if self.is_wake { 2 } else { 0 };
-        let records = self.schedule.due.iter().filter(|due| due.record).count() as f64;
+        let records = self.schedule.iter().filter(|due| due.record).count() as f64;
         let history_bytes = records * (RECORD_BYTES + 40.0 * nx);
         add_files(&mut out, "wake.*", histories, history_bytes);
         let checkpoints = if writes_checkpoints { 2 } else { 0 };

@@ -128,22 +128,14 @@ impl CaseFile {
         let mut case = self.content.clone();
         let CaseKind::Wake(wake) = &mut case.case else {
             let allowed = "absent: this flow has no noise; it is for case.kind = \"wake\"";
-            return Err(self.refused(vec![Problem {
-                key: "--seed".into(),
-                value: seed.to_string(),
-                allowed: allowed.into(),
-            }]));
+            return Err(self.refused(vec![Problem::new("--seed", seed.to_string(), allowed)]));
         };
         wake.seed = Some(seed);
         Ok(self.changed(case))
     }
 
     fn refuse(&self, key: &str, value: impl std::fmt::Debug, allowed: String) -> Error {
-        Error::Scene(self.located(vec![Problem {
-            key: key.into(),
-            value: format!("{value:?}"),
-            allowed,
-        }]))
+        Error::Scene(self.located(vec![Problem::new(key, format!("{value:?}"), allowed)]))
     }
 }
 

@@ -148,13 +148,7 @@ impl RunObserver for Writer<'_> {
     }
 
     fn output(&mut self, flow: &Flow, index: usize) -> Result<(), String> {
-        let due = self
-            .files
-            .schedule
-            .due
-            .get(index)
-            .copied()
-            .unwrap_or_default();
+        let due = self.files.schedule.get(index).copied().unwrap_or_default();
         if due.record
             && let Some(wake) = &mut self.wake
         {

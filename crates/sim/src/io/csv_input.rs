@@ -42,7 +42,7 @@ impl TextTable {
             Some((first, rest)) if first.starts_with("sep=") => rest,
             _ => text,
         };
-        let separator = Separator::from_text(text);
+        let separator = separator(text);
         let mut records = records(text, separator).peekable();
         let mut header = match records.peek() {
             Some(first) if are_numbers(first) => commented_header(text, separator, first.len())?,
@@ -74,7 +74,7 @@ impl TextTable {
             header,
             rows,
             comment,
-            has_decimal_commas: separator != Separator::Comma,
+            has_decimal_commas: separator != ',',
         })
     }
 
@@ -125,52 +125,35 @@ fn are_numbers(cells: &[String]) -> bool {
         .all(|cell| cell.trim().replace(',', ".").parse::<f64>().is_ok())
 }
 
-/// What is between the cells of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Separator {
-    Comma,
-    Semicolon,
-    Tab,
-    /// One or more.
-    Blanks,
+/// What is between the cells of a row, by the first line of cells, a header or numbers; a blank for one or more blanks or tabs.
+fn separator(text: &str) -> char {
+    let mut lines = text
+        .lines()
+        .filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
+    let first = lines.next().unwrap_or_default();
+    let unquoted: String = first.split('"').step_by(2).collect();
+    for separator in [';', '\t'] {
+        if unquoted.contains(separator) {
+            return separator;
+        }
+    }
+    // Names may hold blanks, which divide them only where the next line is as many numbers.
+    let count = first.split_whitespace().count();
+    let next: Vec<&str> = lines.next().unwrap_or(first).split_whitespace().collect();
+    let are_numbers = next.iter().all(|cell| cell.parse::<f64>().is_ok());
+    match count > 1 && next.len() == count && are_numbers {
+        true => ' ',
+        false => ',',
+    }
 }
 
-impl Separator {
-    /// That of the first line of cells, a header or numbers.
-    fn from_text(text: &str) -> Self {
-        let mut lines = text
-            .lines()
-            .filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
-        let first = lines.next().unwrap_or_default();
-        let unquoted: String = first.split('"').step_by(2).collect();
-        if unquoted.contains(';') {
-            return Self::Semicolon;
-        }
-        if unquoted.contains('\t') {
-            return Self::Tab;
-        }
-        // Names may hold blanks, which divide them only where the next line is as many numbers.
-        let count = first.split_whitespace().count();
-        let next: Vec<&str> = lines.next().unwrap_or(first).split_whitespace().collect();
-        let are_numbers = next.iter().all(|cell| cell.parse::<f64>().is_ok());
-        match count > 1 && next.len() == count && are_numbers {
-            true => Self::Blanks,
-            false => Self::Comma,
-        }
-    }
-
-    fn divides(self, c: char) -> bool {
-        match self {
-            Self::Comma => c == ',',
-            Self::Semicolon => c == ';',
-            Self::Tab => c == '\t',
-            Self::Blanks => c == ' ' || c == '\t',
-        }
-    }
+/// Whether a character is between cells.
+fn divides(separator: char, c: char) -> bool {
+    c == separator || (separator == ' ' && c == '\t')
 }
 
 /// The header of a table whose first line are numbers: the last comment before it.
-fn commented_header(text: &str, separator: Separator, count: usize) -> Result<Vec<String>, String> {
+fn commented_header(text: &str, separator: char, count: usize) -> Result<Vec<String>, String> {
     let comments = text.lines().map_while(|line| line.strip_prefix('#'));
     let last = comments.last().unwrap_or_default().trim();
     let names = records(last, separator).next().unwrap_or_default();
@@ -183,14 +166,14 @@ fn commented_header(text: &str, separator: Separator, count: usize) -> Result<Ve
 }
 
 /// Records of cells, without comments and empty lines.
-fn records(text: &str, separator: Separator) -> impl Iterator<Item = Vec<String>> + '_ {
+fn records(text: &str, separator: char) -> impl Iterator<Item = Vec<String>> + '_ {
     let mut chars = text.chars().peekable();
     std::iter::from_fn(move || {
         loop {
             match chars.peek()? {
                 '#' => while chars.next().is_some_and(|c| c != '\n') {},
                 '\n' | '\r' => drop(chars.next()),
-                ' ' if separator == Separator::Blanks => drop(chars.next()),
+                ' ' if separator == ' ' => drop(chars.next()),
                 _ => break,
             }
         }
@@ -204,15 +187,15 @@ fn records(text: &str, separator: Separator) -> impl Iterator<Item = Vec<String>
                 '\r' if !quoted && chars.peek() == Some(&'\n') => {}
                 '\n' | '\r' if !quoted => break,
                 // Blanks together divide once.
-                c if !quoted && separator.divides(c) => {
-                    if separator != Separator::Blanks || !cell.is_empty() {
+                c if !quoted && divides(separator, c) => {
+                    if separator != ' ' || !cell.is_empty() {
                         row.push(std::mem::take(&mut cell));
                     }
                 }
                 _ => cell.push(c),
             }
         }
-        if separator != Separator::Blanks || !cell.is_empty() {
+        if separator != ' ' || !cell.is_empty() {
             row.push(cell);
         }
         Some(row)

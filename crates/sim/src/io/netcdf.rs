@@ -304,71 +304,69 @@ impl Layout {
 
     /// The head of the file, of variables of these sizes at these places \[bytes\].
     fn head(&self, sizes: &[u64], begins: &[u64]) -> Vec<u8> {
-        let mut head = Head(b"CDF\x02\0\0\0\0".to_vec());
-        head.list(0x0A, self.dims.len());
+        let mut head = b"CDF\x02\0\0\0\0".to_vec();
+        push_list(&mut head, 0x0A, self.dims.len());
         for (name, size) in &self.dims {
-            head.name(name);
-            head.number(*size);
+            push_name(&mut head, name);
+            push_number(&mut head, *size);
         }
-        head.list(0x0C, self.globals.len());
+        push_list(&mut head, 0x0C, self.globals.len());
         for (name, text) in &self.globals {
-            head.attribute(name, &Data::text(text.as_str()));
+            push_attribute(&mut head, name, &Data::text(text.as_str()));
         }
-        head.list(0x0B, self.variables.len());
+        push_list(&mut head, 0x0B, self.variables.len());
         for ((variable, size), begin) in self.variables.iter().zip(sizes).zip(begins) {
-            head.name(&variable.name);
-            head.number(variable.dims.len());
+            push_name(&mut head, &variable.name);
+            push_number(&mut head, variable.dims.len());
             for dim in &variable.dims {
                 // Every axis is among the dimensions, or the variable had no values and was refused.
-                head.number(
+                push_number(
+                    &mut head,
                     self.dims
                         .iter()
                         .position(|(name, _)| name == dim)
                         .unwrap_or_default(),
                 );
             }
-            head.list(0x0C, variable.attrs.len());
+            push_list(&mut head, 0x0C, variable.attrs.len());
             for (name, value) in &variable.attrs {
-                head.attribute(name, value);
+                push_attribute(&mut head, name, value);
             }
-            head.number(variable.data.code);
-            head.number(size.next_multiple_of(4) as usize);
-            head.0.extend(begin.to_be_bytes());
+            push_number(&mut head, variable.data.code);
+            push_number(&mut head, size.next_multiple_of(4) as usize);
+            head.extend(begin.to_be_bytes());
         }
-        head.0
+        head
     }
 }
 
-/// The head of a file as it grows, in words of four bytes.
-struct Head(Vec<u8>);
+/// Adds a number to the head of a file, in a word of four bytes.
+fn push_number(head: &mut Vec<u8>, number: usize) {
+    head.extend((number as u32).to_be_bytes());
+}
 
-impl Head {
-    fn number(&mut self, number: usize) {
-        self.0.extend((number as u32).to_be_bytes());
-    }
+/// Adds the tag and the length of a list.
+fn push_list(head: &mut Vec<u8>, tag: usize, length: usize) {
+    push_number(head, if length == 0 { 0 } else { tag });
+    push_number(head, length);
+}
 
-    /// Tag and length of a list.
-    fn list(&mut self, tag: usize, length: usize) {
-        self.number(if length == 0 { 0 } else { tag });
-        self.number(length);
-    }
+fn push_name(head: &mut Vec<u8>, name: &str) {
+    push_number(head, name.len());
+    push_bytes(head, name.as_bytes());
+}
 
-    fn name(&mut self, name: &str) {
-        self.number(name.len());
-        self.bytes(name.as_bytes());
-    }
+fn push_attribute(head: &mut Vec<u8>, name: &str, value: &Data) {
+    push_name(head, name);
+    push_number(head, value.code);
+    push_number(head, value.len());
+    push_bytes(head, &value.bytes);
+}
 
-    fn attribute(&mut self, name: &str, value: &Data) {
-        self.name(name);
-        self.number(value.code);
-        self.number(value.len());
-        self.bytes(&value.bytes);
-    }
-
-    fn bytes(&mut self, bytes: &[u8]) {
-        self.0.extend(bytes);
-        self.0.resize(self.0.len().next_multiple_of(4), 0);
-    }
+/// Adds bytes and what fills their last word.
+fn push_bytes(head: &mut Vec<u8>, bytes: &[u8]) {
+    head.extend(bytes);
+    head.resize(head.len().next_multiple_of(4), 0);
 }
 
 #[cfg(test)]

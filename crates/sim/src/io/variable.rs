@@ -337,13 +337,6 @@ pub(crate) fn of_rays(
     Ok(out)
 }
 
-/// How a ratio of signal and noise is stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum RatioForm {
-    Decibel,
-    Linear,
-}
-
 /// The signal-to-noise ratio of a variable in dB, whether it is stored in dB, as a ratio or as a ratio plus 1, which HALO calls
 /// intensity; NaN where it is missing or not above 0.
 ///
@@ -353,12 +346,12 @@ pub(crate) fn ratio_db(source: &dyn VariableSource, name: &str) -> Result<Vec<f6
     let stored = source.numbers(name)?;
     let units = units(source, name).unwrap_or_default();
     let is_plus_one = is_plus_one(source, name);
-    let form = match units.trim().to_ascii_lowercase().as_str() {
-        "db" | "decibel" | "decibels" => RatioForm::Decibel,
-        "1" | "-" | "unitless" | "dimensionless" | "none" | "linear" | "ratio" => RatioForm::Linear,
-        "" if is_plus_one => RatioForm::Linear,
+    let is_decibel = match units.trim().to_ascii_lowercase().as_str() {
+        "db" | "decibel" | "decibels" => true,
+        "1" | "-" | "unitless" | "dimensionless" | "none" | "linear" | "ratio" => false,
+        "" if is_plus_one => false,
         // No ratio, and none plus 1, is far below 0.
-        "" if stored.iter().any(|value| *value < -1.0) => RatioForm::Decibel,
+        "" if stored.iter().any(|value| *value < -1.0) => true,
         _ => {
             return Err(format!(
                 "{} has units = {}: a ratio of signal and noise needs dB, or 1 for a plain ratio",
@@ -368,7 +361,7 @@ pub(crate) fn ratio_db(source: &dyn VariableSource, name: &str) -> Result<Vec<f6
         }
     };
     let mut linear = stored;
-    if form == RatioForm::Decibel {
+    if is_decibel {
         if !is_plus_one {
             return Ok(linear);
         }

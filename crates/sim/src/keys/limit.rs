@@ -157,11 +157,7 @@ impl<'s> Checker<'s> {
 
     /// A problem whose value is shown as `value` says it.
     pub(crate) fn refuse(&mut self, key: &str, value: &str, allowed: impl Into<String>) {
-        self.found.push(Problem {
-            key: key.into(),
-            value: value.into(),
-            allowed: allowed.into(),
-        });
+        self.found.push(Problem::new(key, value, allowed));
     }
 
     /// A condition on a value.

@@ -12,9 +12,24 @@ pub struct Problem {
     pub value: String,
     /// What is allowed, with the unit.
     pub allowed: String,
+    /// Line of the key in the file, from 1; `None` where the value is a default, or of no file.
+    pub line: Option<usize>,
 }
 
 impl Problem {
+    /// A problem of no line.
+    pub fn new(
+        key: impl Into<String>,
+        value: impl Into<String>,
+        allowed: impl Into<String>,
+    ) -> Self {
+        Self {
+            key: key.into(),
+            value: value.into(),
+            allowed: allowed.into(),
+            line: None,
+        }
+    }
     /// The value of a key that is not there.
     pub const ABSENT: &str = "absent";
 }
@@ -28,15 +43,6 @@ impl Display for Problem {
             value => write!(f, "{} = {value} is not allowed: {}", self.key, self.allowed),
         }
     }
-}
-
-/// A problem and the line where the file states it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Located {
-    /// What is wrong.
-    pub problem: Problem,
-    /// Line of the key in the file, from 1; `None` where the value is a default.
-    pub line: Option<usize>,
 }
 
 /// Why a scene or a case was refused.
@@ -67,18 +73,18 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// All of them, in the order of their lines.
-        problems: Vec<Located>,
+        problems: Vec<Problem>,
     },
 }
 
 /// Most problems that a message lists.
 const MOST_LINES: usize = 50;
 
-fn list(path: &Path, problems: &[Located]) -> String {
+fn list(path: &Path, problems: &[Problem]) -> String {
     let path = path.display();
     let mut lines = Vec::new();
-    for Located { problem, line } in problems.iter().take(MOST_LINES) {
-        lines.push(match line {
+    for problem in problems.iter().take(MOST_LINES) {
+        lines.push(match problem.line {
             Some(line) => format!("{path}:{line}: {problem}"),
             None => format!("{path}: {problem}"),
         });

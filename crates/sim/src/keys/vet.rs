@@ -3,7 +3,7 @@
 
 use super::declare::{Declared, from_table};
 use super::key::{Key, Kind, join};
-use super::problem::{Located, Problem, SceneError};
+use super::problem::{Problem, SceneError};
 use super::words::{near, one_of, quote, table_with, wanted};
 use std::ops::Range;
 use std::path::Path;
@@ -158,9 +158,8 @@ impl<'a> Text<'a> {
     }
 
     /// Problems with the lines where the text states their keys, and values as it writes them.
-    pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
-        let mut located = Vec::with_capacity(problems.len());
-        for mut problem in problems {
+    pub(crate) fn located(&self, mut problems: Vec<Problem>) -> SceneError {
+        for problem in &mut problems {
             if let Some(written) = self.written(&problem.key) {
                 problem.value = written;
             } else if self.line(&problem.key).is_none()
@@ -168,16 +167,13 @@ impl<'a> Text<'a> {
             {
                 problem.value += " (the default)";
             }
-            located.push(Located {
-                line: self.line_near(&problem.key),
-                problem,
-            });
+            problem.line = self.line_near(&problem.key);
         }
-        self.invalid(located)
+        self.invalid(problems)
     }
 
-    fn invalid(&self, mut problems: Vec<Located>) -> SceneError {
-        problems.sort_by_key(|located| located.line);
+    fn invalid(&self, mut problems: Vec<Problem>) -> SceneError {
+        problems.sort_by_key(|problem| problem.line);
         SceneError::Invalid {
             path: self.path.to_owned(),
             problems,
@@ -276,21 +272,16 @@ struct Place<'p> {
 struct Walk<'w> {
     document: &'w Text<'w>,
     format: &'w Format<'w>,
-    found: Vec<Located>,
+    found: Vec<Problem>,
     /// Paths of keys that are not known, where these are skipped.
     skipped: Option<Vec<String>>,
 }
 
 impl Walk<'_> {
     fn refuse(&mut self, key: String, value: String, allowed: String, line: usize) {
-        self.found.push(Located {
-            problem: Problem {
-                key,
-                value,
-                allowed,
-            },
-            line: Some(line),
-        });
+        let mut problem = Problem::new(key, value, allowed);
+        problem.line = Some(line);
+        self.found.push(problem);
     }
 
     /// A value as the text writes it; nothing for tables, which no line can show.

@@ -152,18 +152,14 @@ fn refused(file: &SceneFile, t: &RefractiveTurbulence, error: wakescope_optics::
              telescope.receiver = \"bistatic\", which needs no screens for signals",
             v.found, v.needed
         );
-        problems.push(Problem {
-            key: key("sampling"),
-            value: "\"derived\"".into(),
-            allowed,
-        });
+        problems.push(Problem::new(key("sampling"), "\"derived\"", allowed));
     } else if t.sampling == ScreenSampling::Derived {
         let words: Vec<String> = violations.iter().map(ToString::to_string).collect();
-        problems.push(Problem {
-            key: key("sampling"),
-            value: "\"derived\"".into(),
-            allowed: words.join("; "),
-        });
+        problems.push(Problem::new(
+            key("sampling"),
+            "\"derived\"",
+            words.join("; "),
+        ));
     } else {
         if let Some(v) = strongest(|v| !v.limit.is_spacing(), 1.0) {
             let mut points = (v.needed / t.grid_spacing_m).ceil() as usize;
@@ -225,17 +221,9 @@ fn of_grid(file: &SceneFile, [own, other]: [&str; 2], value: String, allowed: St
             let allowed = format!(
                 "one for which {own} = {value}, the default, holds, which has to be {allowed}"
             );
-            Problem {
-                key: stated,
-                value: String::new(),
-                allowed,
-            }
+            Problem::new(stated, String::new(), allowed)
         }
-        _ => Problem {
-            key: key(own),
-            value,
-            allowed,
-        },
+        _ => Problem::new(key(own), value, allowed),
     }
 }
 

@@ -153,15 +153,15 @@ fn above_ground(file: &SceneFile, scan: &Schedule) -> Result<(), Error> {
     else {
         return Ok(());
     };
-    let problem = Problem {
-        key: s.pattern.lowest_key().into(),
-        value: format!("{:?}", lowest.elevation_rad),
-        allowed: format!(
+    let problem = Problem::new(
+        s.pattern.lowest_key(),
+        format!("{:?}", lowest.elevation_rad),
+        format!(
             "beams above the ground up to scan.range_max_m; the one at {:.3} s ends {:.3} m below it, which \
              scan.below_ground.policy = \"mask\" allows",
             lowest.time_s,
             -low(&lowest)
         ),
-    };
+    );
     Err(file.located(vec![problem]).into())
 }

@@ -5,7 +5,7 @@
 
 use super::axis::{Axis, Scale};
 use super::colour::curve_colour;
-use super::drawing::{Anchor, Frame, Pen, Shape};
+use super::drawing::{Anchor, Frame, Shape};
 use super::font::Font;
 use super::frame::{BOTTOM, GRID, HALF_HEIGHT, LEFT, TICK_SIZE, inner, panel, top_room};
 use crate::io::{OutputResult, same_length};
@@ -274,8 +274,9 @@ impl Series {
         self
     }
 
-    fn pen(&self, colour: usize) -> Pen {
-        Pen {
+    fn line(&self, points: &[(f64, f64)], colour: usize) -> Shape {
+        Shape::Line {
+            points: points.to_vec(),
             colour: curve_colour(colour),
             width: LINE_WIDTH,
             dash: self.style.dash(),
@@ -320,10 +321,9 @@ impl Series {
             }
         }
         if self.style.has_line() {
-            out.extend(pieces(points).map(|p| Shape::Line {
-                points: p.to_vec(),
-                pen: self.pen(colour),
-            }));
+            for piece in pieces(points) {
+                out.push(self.line(piece, colour));
+            }
         }
         if self.style.has_markers() {
             for point in points {
@@ -395,10 +395,7 @@ fn draw_legend(series: &[(usize, &Series)], place: Frame, out: &mut Vec<Shape>) 
         let x = place.left + PAD;
         let y = place.top + 0.5 * PAD + LINE * (row as f64 + 0.5);
         if series.style.has_line() {
-            out.push(Shape::Line {
-                points: vec![(x, y), (x + SAMPLE, y)],
-                pen: series.pen(*colour),
-            });
+            out.push(series.line(&[(x, y), (x + SAMPLE, y)], *colour));
         }
         if series.style.has_markers() {
             out.push(marker((x + SAMPLE / 2.0, y), *colour));

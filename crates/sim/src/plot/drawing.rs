@@ -44,15 +44,6 @@ impl Frame {
     }
 }
 
-/// How a line is drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Pen {
-    pub(crate) colour: Rgb,
-    pub(crate) width: f64,
-    /// On and off lengths in drawing units; empty = solid.
-    pub(crate) dash: &'static [f64],
-}
-
 /// Where in a text its point is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Anchor {
@@ -78,7 +69,10 @@ pub(crate) struct Text {
 pub(crate) enum Shape {
     Line {
         points: Vec<(f64, f64)>,
-        pen: Pen,
+        colour: Rgb,
+        width: f64,
+        /// On and off lengths in drawing units; empty = solid.
+        dash: &'static [f64],
     },
     Area {
         points: Vec<(f64, f64)>,
@@ -102,11 +96,9 @@ impl Shape {
     pub(crate) fn line(points: impl Into<Vec<(f64, f64)>>, colour: Rgb, width: f64) -> Self {
         Self::Line {
             points: points.into(),
-            pen: Pen {
-                colour,
-                width,
-                dash: &[],
-            },
+            colour,
+            width,
+            dash: &[],
         }
     }
 

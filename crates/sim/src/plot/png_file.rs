@@ -60,15 +60,20 @@ impl Painter {
     fn shapes(&mut self, shapes: &[Shape]) {
         for shape in shapes {
             match shape {
-                Shape::Line { points, pen } => {
-                    let dash = StrokeDash::new(pen.dash.iter().map(|d| *d as f32).collect(), 0.0);
+                Shape::Line {
+                    points,
+                    colour,
+                    width,
+                    dash,
+                } => {
+                    let dash = StrokeDash::new(dash.iter().map(|d| *d as f32).collect(), 0.0);
                     let stroke = Stroke {
-                        width: pen.width as f32,
+                        width: *width as f32,
                         line_join: LineJoin::Round,
                         dash,
                         ..Stroke::default()
                     };
-                    self.stroke(path(points), pen.colour, &stroke);
+                    self.stroke(path(points), *colour, &stroke);
                 }
                 Shape::Area {
                     points,

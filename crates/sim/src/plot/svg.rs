@@ -47,12 +47,16 @@ pub fn escape(text: &str) -> String {
 
 fn element(shape: &Shape) -> OutputResult<String> {
     Ok(match shape {
-        Shape::Line { points, pen } => {
+        Shape::Line {
+            points,
+            colour,
+            width,
+            dash,
+        } => {
             let points = pairs(points);
-            let colour = hex(pen.colour);
-            let width = number(pen.width);
-            let mut dash = pen
-                .dash
+            let colour = hex(*colour);
+            let width = number(*width);
+            let mut dash = dash
                 .iter()
                 .map(|d| number(*d))
                 .collect::<Vec<_>>()

@@ -163,11 +163,7 @@ pub(super) fn problems(scene: &Scene, document: &Text<'_>) -> Vec<Problem> {
         let value = value_at(&own, key)
             .map(|value| value.to_string())
             .unwrap_or_default();
-        Problem {
-            key: key.into(),
-            value,
-            allowed: format!("{purpose}: take the line out"),
-        }
+        Problem::new(key, value, format!("{purpose}: take the line out"))
     };
     idle.into_iter().map(problem).collect()
 }

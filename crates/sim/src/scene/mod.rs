@@ -21,7 +21,7 @@ mod retrieval;
 pub use crate::document::{Content, Document};
 pub use crate::io::Site;
 pub use crate::io::hash_of;
-pub use crate::keys::{Located, Problem, SceneError};
+pub use crate::keys::{Problem, SceneError};
 pub use atmosphere::*;
 pub use estimator::*;
 pub use flow::*;

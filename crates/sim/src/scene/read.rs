@@ -118,12 +118,7 @@ impl SceneFile {
         let whole = toml::Value::Table(to_table(&self.content));
         let value = value_at(&whole, key).filter(|value| !value.is_table());
         let value = value.map(|value| value.to_string()).unwrap_or_default();
-        self.located(vec![Problem {
-            key: key.into(),
-            value,
-            allowed: reason,
-        }])
-        .into()
+        self.located(vec![Problem::new(key, value, reason)]).into()
     }
 }
 

@@ -8,7 +8,7 @@ use super::key_path::{Holds, SceneKey, VaryingKey, resolve};
 use crate::Error;
 use crate::io::csv_input::TextTable;
 use crate::io::{Provenance, csv::float_text};
-use crate::keys::{Located, Problem, SceneError, to_table, value_at};
+use crate::keys::{Problem, SceneError, to_table, value_at};
 use crate::scene::{Scene, SceneFile, hash_of};
 use crate::streams::stream;
 use rand_xoshiro::rand_core::Rng;
@@ -152,7 +152,9 @@ fn described<'a>(names: impl Iterator<Item = &'a str>, values: &[String]) -> Str
 /// An error of a case; the lines of its text are no lines of a file.
 fn failed(case: usize, keys: String, others: usize, mut error: Error) -> Error {
     if let Error::Scene(SceneError::Invalid { problems, .. }) = &mut error {
-        problems.iter_mut().for_each(|located| located.line = None);
+        for problem in problems {
+            problem.line = None;
+        }
     }
     Error::Case {
         case,
@@ -166,20 +168,9 @@ fn failed(case: usize, keys: String, others: usize, mut error: Error) -> Error {
 fn refused(word: &str, problem: Problem) -> Error {
     SceneError::Invalid {
         path: word.into(),
-        problems: vec![Located {
-            problem,
-            line: None,
-        }],
+        problems: vec![problem],
     }
     .into()
-}
-
-fn problem(key: &str, value: &str, allowed: impl Into<String>) -> Problem {
-    Problem {
-        key: key.into(),
-        value: value.into(),
-        allowed: allowed.into(),
-    }
 }
 
 /// Keys that vary together, and their values, a row for each combination.
@@ -195,14 +186,14 @@ fn check_columns(
     for column in columns.iter().chain(lets.iter().map(|(own, _)| own)) {
         if paths.contains(&&column.key.path) {
             let why = "each key varies once, by --vary, --cases or --let";
-            return Err(refused("sweep", problem(&column.shown.name, "", why)));
+            return Err(refused("sweep", Problem::new(&column.shown.name, "", why)));
         }
         paths.push(&column.key.path);
         has_seed |= column.key.path == "seed";
     }
     if is_independent && has_seed {
         let why = "with --independent each case has a seed of its own: leave one of the two out";
-        return Err(refused("sweep", problem("seed", "", why)));
+        return Err(refused("sweep", Problem::new("seed", "", why)));
     }
     Ok(())
 }
@@ -234,7 +225,7 @@ impl<'a> Grid<'a> {
         }
         for text in &request.conditions {
             expression::holds(text, None)
-                .map_err(|why| refused("--where", problem("condition", text, why)))?;
+                .map_err(|why| refused("--where", Problem::new("condition", text, why)))?;
         }
         let mut count = 1.0;
         let mut columns = Vec::new();
@@ -247,7 +238,7 @@ impl<'a> Grid<'a> {
         if count > MOST_CASES as f64 {
             let why =
                 format!("a sweep has 1 to {MOST_CASES} cases: fewer values, or several sweeps");
-            let problem = problem("number of cases", &format!("{count:?}"), why);
+            let problem = Problem::new("number of cases", &format!("{count:?}"), why);
             return Err(refused("sweep", problem));
         }
         let mut combinations = vec![Vec::new()];
@@ -305,7 +296,7 @@ impl<'a> Grid<'a> {
             let why = format!("none of the {} cases is left", self.rows.len());
             return Err(refused(
                 "--where",
-                problem("condition", &self.request.conditions.join(" and "), why),
+                Problem::new("condition", &self.request.conditions.join(" and "), why),
             ));
         }
         Ok(cases)
@@ -331,8 +322,9 @@ impl<'a> Grid<'a> {
         }
         for (column, expression) in &self.lets {
             let whole = self.whole(&table)?;
-            let value = computed(column, expression, &whole)
-                .map_err(|why| refused("--let", problem(&column.shown.name, expression, why)))?;
+            let value = computed(column, expression, &whole).map_err(|why| {
+                refused("--let", Problem::new(&column.shown.name, *expression, why))
+            })?;
             values.push(cell_text(&value));
             set(&mut table, &column.key.path, value);
         }
@@ -340,7 +332,9 @@ impl<'a> Grid<'a> {
             let whole = self.whole(&table)?;
             for condition in &self.request.conditions {
                 let holds = expression::holds(condition, Some(&|name| value_of(&whole, name)));
-                if !holds.map_err(|why| refused("--where", problem("condition", condition, why)))? {
+                if !holds
+                    .map_err(|why| refused("--where", Problem::new("condition", condition, why)))?
+                {
                     return Ok(None);
                 }
             }
@@ -406,14 +400,14 @@ fn axis(word: &str) -> Result<Axis, Problem> {
         "KEY=VALUES, e.g. pulse.energy_j=50e-6,150e-6 or pulse.energy_j=log:50e-6:600e-6:7";
     let (name, text) = word
         .split_once('=')
-        .ok_or_else(|| problem("--vary", word, example))?;
+        .ok_or_else(|| Problem::new("--vary", word, example))?;
     let name = name.trim();
     let text = text.trim();
     let column = Column::named(name, text, false)?;
     let key = &column.key;
     let is_numeric = column.shown.holds != Holds::Texts;
     if text.is_empty() {
-        return Err(problem(
+        return Err(Problem::new(
             name,
             "an empty list",
             format!("at least one value is needed: {example}"),
@@ -424,7 +418,8 @@ fn axis(word: &str) -> Result<Axis, Problem> {
         .filter(|(kind, _)| is_numeric && matches!(*kind, "lin" | "log"));
     let values = match range {
         Some((kind, rest)) => {
-            let numbers = range_of(kind == "log", rest).map_err(|why| problem(name, text, why))?;
+            let numbers =
+                range_of(kind == "log", rest).map_err(|why| Problem::new(name, text, why))?;
             numbers
                 .into_iter()
                 .map(|number| key.of_number(number))
@@ -486,17 +481,17 @@ fn binding(word: &str) -> Result<(Column, &str), Problem> {
     let example = "KEY = EXPRESSION, e.g. pulse.energy_j = 0.06/laser.pulse_repetition_hz";
     let (name, text) = word
         .split_once('=')
-        .ok_or_else(|| problem("--let", word, example))?;
+        .ok_or_else(|| Problem::new("--let", word, example))?;
     let column = Column::named(name, text, true)?;
     let text = text.trim();
     if column.shown.holds == Holds::Texts {
-        return Err(problem(
+        return Err(Problem::new(
             &column.shown.name,
             text,
             "an expression is a number, and this key is none",
         ));
     }
-    expression::value(text, None).map_err(|why| problem(&column.shown.name, text, why))?;
+    expression::value(text, None).map_err(|why| Problem::new(&column.shown.name, text, why))?;
     Ok((column, text))
 }
 
@@ -509,7 +504,7 @@ fn list(path: &Path) -> Result<Axis, Error> {
 
 fn list_of_table(table: &TextTable) -> Result<Axis, Problem> {
     if table.rows.is_empty() {
-        return Err(problem(
+        return Err(Problem::new(
             "rows",
             "0",
             "at least one row below the names of the keys",

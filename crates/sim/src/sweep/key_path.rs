@@ -66,11 +66,9 @@ fn shortens(short: &str, path: &str) -> bool {
 
 /// The key that a path names; `value` is what it was to be, for the message.
 pub(super) fn resolve(written: &str, value: &str) -> Result<SceneKey, Problem> {
-    varying_key(written).cloned().map_err(|allowed| Problem {
-        key: written.into(),
-        value: value.into(),
-        allowed,
-    })
+    varying_key(written)
+        .cloned()
+        .map_err(|allowed| Problem::new(written, value, allowed))
 }
 
 fn varying_key(written: &str) -> Result<&'static SceneKey, String> {
@@ -197,11 +195,7 @@ impl SceneKey {
             Kind::Choice(names) => one_of(names, value),
             _ => "true or false".into(),
         };
-        Problem {
-            key: self.path.clone(),
-            value: value.into(),
-            allowed,
-        }
+        Problem::new(self.path.clone(), value, allowed)
     }
 }
 

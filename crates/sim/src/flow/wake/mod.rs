@@ -23,4 +23,4 @@ pub(super) use pictures::PICTURES;
 #[cfg(feature = "plots")]
 pub use pictures::REPEATS;
 pub use preset::WakePreset;
-pub(super) use schedule::{Due, Schedule};
+pub(super) use schedule::{Due, plain_schedule, wake_schedule};

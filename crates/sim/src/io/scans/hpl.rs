@@ -81,7 +81,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
 fn rays(header: &Header, lines: &[(usize, &str)]) -> Result<(Vec<RayRow>, Vec<Vec<f64>>), String> {
     let mut rays: Vec<RayRow> = Vec::new();
     let mut intensities: Vec<Vec<f64>> = Vec::new();
-    let mut clock = Clock::new(header);
+    let mut all_hours = Vec::new();
     let mut rest = lines.iter();
     while let Some((number, line)) = rest.next() {
         let [hours, azimuth, elevation] = numbers(line)
@@ -115,51 +115,41 @@ fn rays(header: &Header, lines: &[(usize, &str)]) -> Result<(Vec<RayRow>, Vec<Ve
         rays.push(RayRow {
             elevation_rad: elevation.to_radians(),
             azimuth_rad: azimuth.to_radians(),
-            time_s: clock.time_s(hours),
+            time_s: f64::NAN,
             velocity_m_s,
             sigma_m_s: Vec::new(),
         });
         intensities.push(intensity);
+        all_hours.push(hours);
+    }
+    for (ray, time_s) in rays.iter_mut().zip(times_s(header, &all_hours)) {
+        ray.time_s = time_s;
     }
     Ok((rays, intensities))
 }
 
-/// Times of rays from their hours since midnight, which begin anew on the next day.
-struct Clock {
-    /// Whether the date of the file is known, or it has none.
-    is_known: bool,
-    /// Those of the ray before, or of the opening of the file, s since the midnight before it.
-    last_s: Option<f64>,
-    days_s: f64,
-}
-
-impl Clock {
-    fn new(header: &Header) -> Self {
-        Self {
-            is_known: header.not_understood.is_none(),
-            last_s: header.second_of_day,
-            days_s: 0.0,
-        }
-    }
-
-    /// The time of the next ray, s.
-    fn time_s(&mut self, hours: f64) -> f64 {
+/// Times of rays, s, from their hours since midnight, which begin anew on the next day; NaN in a file whose date is not understood.
+fn times_s(header: &Header, hours: &[f64]) -> Vec<f64> {
+    let mut times_s = Vec::with_capacity(hours.len());
+    // That of the ray before, or of the opening of the file, since the midnight before it.
+    let mut last_s = header.second_of_day;
+    let mut days_s = 0.0;
+    for hours in hours {
         let own_s = 3600.0 * hours;
-        let later_s = self
-            .last_s
-            .map_or(0.0, |last_s| own_s + self.days_s - last_s);
+        let later_s = last_s.map_or(0.0, |last_s| own_s + days_s - last_s);
         if later_s < -0.5 * DAY_S {
-            self.days_s += DAY_S;
+            days_s += DAY_S;
         } else if later_s > 0.5 * DAY_S {
             // Opened after midnight with a ray of the day before.
-            self.days_s -= DAY_S;
+            days_s -= DAY_S;
         }
-        self.last_s = Some(own_s + self.days_s);
-        match self.is_known {
-            true => own_s + self.days_s,
-            false => f64::NAN,
-        }
+        last_s = Some(own_s + days_s);
+        times_s.push(match header.not_understood {
+            None => own_s + days_s,
+            Some(_) => f64::NAN,
+        });
     }
+    times_s
 }
 
 impl Header {
