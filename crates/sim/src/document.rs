@@ -100,7 +100,7 @@ impl<T: Content> Document<T> {
         }
     }
 
-    /// Problems of what was asked for beside the file.
+    /// Problems of requests beside the file.
     pub(crate) fn refused(&self, problems: Vec<Problem>) -> SceneError {
         SceneError::Invalid {
             path: self.path.clone(),

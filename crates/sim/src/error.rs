@@ -125,13 +125,13 @@ pub enum Error {
         /// What would take less: keys, for a flow with values that would fit.
         remedy: String,
     },
-    /// The one who was told of its progress has stopped the run.
+    /// The observer of the progress has stopped the run.
     #[error("stopped")]
     Stopped,
     /// The number of threads cannot be had.
     #[error("--threads {threads}: {reason}")]
     Threads {
-        /// The number asked for.
+        /// The requested number.
         threads: usize,
         /// What the thread pool says.
         reason: String,

@@ -1,4 +1,4 @@
-//! The processes that `mpirun` has started as the ranks of a flow: for the program, and for programs of one's own, which give
+//! The processes that `mpirun` has started as the ranks of a flow: for the program, and for user-supplied programs, which give
 //! [`World::ranks`] to `FlowSettings::ranks` (the example `exchange_times` begins like this).
 //!
 //! All calls to MPI are made by the thread that joined. A process that fails ends all others: none waits for it in vain.
@@ -59,7 +59,7 @@ impl World {
         })
     }
 
-    /// Ends all processes after `say` has told why: that of rank 0, or, where it has nothing to say, that of another one.
+    /// Ends all processes after `say` has reported why: that of rank 0, or, where it reports nothing, that of another one.
     pub fn fail(&self, say: impl FnOnce()) -> ! {
         let world = SimpleCommunicator::world();
         if world.rank() > 0 {

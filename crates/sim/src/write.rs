@@ -11,7 +11,7 @@ pub use map::velocity_map;
 
 use crate::Error;
 
-use crate::io::signals::{RawSignals, Recording};
+use crate::io::signals::RawSignals;
 use crate::io::{Existing, Table, VelocityMap, hpl, tables};
 use crate::measure::beam_winds;
 use crate::measure::profile::RangeProfile;
@@ -283,9 +283,23 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
             azimuth_rad.push(beam.azimuth_rad);
         }
     }
+    let detector = &scene.detector;
     let first_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
+    let mut time_s = Vec::with_capacity(g.samples);
+    for sample in 0..g.samples {
+        time_s.push(first_s + sample as f64 / detector.sampling_hz);
+    }
     Some(RawSignals {
-        recording: recording(plan),
+        sampling_hz: detector.sampling_hz,
+        intermediate_frequency_hz: match detector.signal {
+            DetectorSignal::Baseband => 0.0,
+            _ => detector.intermediate_frequency_hz,
+        },
+        bandwidth_hz: detector.bandwidth_hz,
+        wavelength_m: scene.laser.wavelength_m,
+        pulse_repetition_hz: scene.laser.pulse_repetition_hz,
+        pulse_sigma_s: scene.pulse_sigma_s(),
+        noise_power_a2: noise_power_a2(plan),
         range_m: g.layer_range_m().collect(),
         radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
         pulse_time_s,
@@ -293,36 +307,21 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
         quadrature_a: result.quadrature_a.as_ref().map(|values| values.view()),
         elevation_rad,
         azimuth_rad,
-        time_s: (0..g.samples)
-            .map(|k| first_s + k as f64 / scene.detector.sampling_hz)
-            .collect(),
+        time_s,
         first_pulse: g.schedule.lines.iter().map(|line| line.first).collect(),
     })
 }
 
-fn recording(plan: &Plan) -> Recording {
-    let scene = plan.scene();
-    let d = &scene.detector;
-    let receiver = &plan.instrument.receiver;
-    let is_baseband = d.signal == DetectorSignal::Baseband;
+/// Mean square of the noise of a sample, of both quadratures together, A^2.
+fn noise_power_a2(plan: &Plan) -> f64 {
+    let detector = &plan.scene().detector;
+    let is_baseband = detector.signal == DetectorSignal::Baseband;
     // (13) in the band; white noise goes to half the sampling frequency, and to both sides of zero in two quadratures.
-    let noise_band_hz = match d.noise {
+    let noise_band_hz = match detector.noise {
         NoiseModel::None => 0.0,
-        NoiseModel::BandLimited => d.bandwidth_hz,
-        NoiseModel::White if is_baseband => d.sampling_hz,
-        NoiseModel::White => 0.5 * d.sampling_hz,
+        NoiseModel::BandLimited => detector.bandwidth_hz,
+        NoiseModel::White if is_baseband => detector.sampling_hz,
+        NoiseModel::White => 0.5 * detector.sampling_hz,
     };
-    Recording {
-        sampling_hz: d.sampling_hz,
-        intermediate_frequency_hz: if is_baseband {
-            0.0
-        } else {
-            d.intermediate_frequency_hz
-        },
-        bandwidth_hz: d.bandwidth_hz,
-        wavelength_m: scene.laser.wavelength_m,
-        pulse_repetition_hz: scene.laser.pulse_repetition_hz,
-        pulse_sigma_s: scene.pulse_sigma_s(),
-        noise_power_a2: receiver.noise_density_a2_hz() * noise_band_hz,
-    }
+    plan.instrument.receiver.noise_density_a2_hz() * noise_band_hz
 }

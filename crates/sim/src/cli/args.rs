@@ -118,7 +118,7 @@ pub(super) struct Signals {
 }
 
 impl ScanArgs {
-    /// The scans of a file; raw signals go through the estimator of the scene, whose spectra are kept if asked for.
+    /// The scans of a file; raw signals go through the estimator of the scene, whose spectra are kept if requested.
     pub(super) fn read(
         &self,
         path: &Path,

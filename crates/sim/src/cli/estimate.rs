@@ -65,7 +65,7 @@ pub(super) fn estimate(args: &EstimateArgs, cli: &Cli) -> Result<(), Error> {
         block_bytes: None,
     };
     let found = recorded::estimate((&plan, is_own), &mut records, &options, &*observer)?;
-    let (text, results) = told(&plan, &found, records.records);
+    let (text, results) = report(&plan, &found, records.records);
     let of = (plan.scene().outputs, plan.file.provenance());
     let object = json!({ "scene_hash": plan.file.hash, "data": args.data.to_string_lossy(), "results": results });
     args.folder.finish(
@@ -77,7 +77,7 @@ pub(super) fn estimate(args: &EstimateArgs, cli: &Cli) -> Result<(), Error> {
 }
 
 /// The result in a few numbers.
-fn told(plan: &Plan, found: &Recorded, records: usize) -> (String, serde_json::Value) {
+fn report(plan: &Plan, found: &Recorded, records: usize) -> (String, serde_json::Value) {
     match found {
         Recorded::OfRun { map, .. } => {
             let scans = plan.realisations();

@@ -251,7 +251,7 @@ fn report(
     cli.say(&object, &text)
 }
 
-/// What Open MPI and MPICH (with its relatives) tell each process of their number.
+/// Variables in which Open MPI and MPICH (with its relatives) give each process the number of processes.
 const COUNTS: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
 
 /// Runs `work` on the processes that share it. Where it fails, rank 0 alone says so, and all end.

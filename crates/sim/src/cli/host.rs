@@ -27,9 +27,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub struct Host {
     /// Who is notified of progress and warnings; it may stop the run.
     pub observer: Arc<dyn Observer + Send>,
-    /// Texts of scenes and cases, by the words that stand for their files.
+    /// Texts of scenes and cases, by the arguments in place of their files.
     pub texts: BTreeMap<PathBuf, String>,
-    /// Signals, whose path stands for a file.
+    /// Signals, whose path is the argument in place of a file.
     pub signals: Mutex<Option<RawRecords>>,
     /// Whether files of `--out` stay in memory; those of flows, wakes and sweeps, which can be continued, are written.
     pub keeps_files: bool,
@@ -76,12 +76,6 @@ pub fn refusal(mut error: Error, lines: bool) -> Refusal {
     Refusal(as_object(&error))
 }
 
-/// A [`Host`] and its answer while a command runs.
-pub(super) struct Call {
-    host: Host,
-    answer: Mutex<Answer>,
-}
-
 /// Runs a command in this process, with its arguments as after `wakescope`.
 ///
 /// # Errors
@@ -91,41 +85,39 @@ pub fn call(args: &[OsString], host: Host) -> Result<Answer, Refusal> {
         .into_iter()
         .chain(args.iter().cloned());
     let mut cli = Cli::read(args).map_err(|error| Refusal(explained(&error)))?;
-    let call = Arc::new(Call {
-        host,
-        answer: Mutex::default(),
-    });
-    (cli.quiet, cli.json, cli.call) = (true, true, Some(call.clone()));
+    let has_texts = !host.texts.is_empty();
+    cli.quiet = true;
+    cli.json = true;
+    cli.host = Some(host);
     let done = stoppable(|| with_threads(&cli, || dispatch(&cli)).flatten());
-    let code = done.map_err(|error| refusal(error, call.host.texts.is_empty()))?;
+    let code = done.map_err(|error| refusal(error, !has_texts))?;
     Ok(Answer {
         code,
-        ..std::mem::take(&mut *call.answer())
+        ..std::mem::take(&mut *cli.answer())
     })
-}
-
-impl Call {
-    fn answer(&self) -> std::sync::MutexGuard<'_, Answer> {
-        self.answer.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 /// Where commands read and write.
 impl Cli {
-    /// Who is notified of the progress: the program that called, else bars, unless quiet was asked for.
+    fn answer(&self) -> std::sync::MutexGuard<'_, Answer> {
+        self.answer.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Who is notified of the progress: the program that called, else progress bars, unless `--quiet` is given.
     pub(super) fn observer(&self) -> Arc<dyn Observer + Send> {
-        match &self.call {
-            Some(call) => call.host.observer.clone(),
+        match &self.host {
+            Some(host) => host.observer.clone(),
             None => Arc::new(Bars::new(self.quiet)),
         }
     }
 
     /// Gives a result: as the object, or as the text.
     pub(super) fn say(&self, object: &Value, text: &str) -> Result<(), Error> {
-        match &self.call {
-            Some(call) => {
-                let mut answer = call.answer();
-                (answer.object, answer.text) = (object.clone(), text.to_owned());
+        match &self.host {
+            Some(_) => {
+                let mut answer = self.answer();
+                answer.object = object.clone();
+                answer.text = text.to_owned();
                 Ok(())
             }
             None if self.json => print(&format!("{object:#}\n")),
@@ -135,17 +127,17 @@ impl Cli {
 
     /// Gives a text as it is.
     pub(super) fn print(&self, text: &str) -> Result<(), Error> {
-        let Some(call) = &self.call else {
+        if self.host.is_none() {
             return print(text);
-        };
-        text.clone_into(&mut call.answer().text);
+        }
+        text.clone_into(&mut self.answer().text);
         Ok(())
     }
 
     /// The text of a scene or a case: what the program that called has for its path, else that of the file.
     fn text(&self, path: &Path) -> Result<Cow<'_, str>, SceneError> {
-        if let Some(call) = &self.call
-            && let Some(text) = call.host.texts.get(path)
+        if let Some(host) = &self.host
+            && let Some(text) = host.texts.get(path)
         {
             return Ok(text.into());
         }
@@ -173,7 +165,7 @@ impl Cli {
         Sweep::parse(&self.text(path)?, path, request)
     }
 
-    /// Whether a path stands for the case of a flow, by its keys, and not for a scene.
+    /// Whether a path is that of the case of a flow, by its keys, and not of a scene.
     pub(super) fn is_case(&self, path: &Path) -> bool {
         self.text(path).is_ok_and(|text| CaseFile::is_of(&text))
     }
@@ -184,20 +176,20 @@ impl Cli {
         Ok(CaseFile::parse_over(preset, &text, path)?)
     }
 
-    /// The signals that a path stands for, where the program that called gave them.
+    /// The signals of a path, if the calling program supplies them.
     pub(super) fn signals(&self, path: &Path) -> Option<RawRecords> {
         let mut held = self
-            .call
-            .as_ref()?
             .host
+            .as_ref()?
             .signals
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
         held.take_if(|records| records.path == path)
     }
 
-    fn keeper(&self) -> Option<&Call> {
-        self.call.as_deref().filter(|call| call.host.keeps_files)
+    /// Whether files stay in memory.
+    fn keeps_files(&self) -> bool {
+        self.host.as_ref().is_some_and(|host| host.keeps_files)
     }
 
     /// Finds out whether files of these names can be written to a folder.
@@ -207,7 +199,7 @@ impl Cli {
         names: &[String],
         existing: Existing,
     ) -> Result<(), Error> {
-        if self.keeper().is_some() {
+        if self.keeps_files() {
             self.refuse_idle("--out", OF_KEPT_FILES)
         } else {
             outputs::prepare(folder, names, existing, true)
@@ -222,12 +214,12 @@ impl Cli {
         of: (Formats, Provenance),
         list: impl List,
     ) -> Result<Vec<PathBuf>, Error> {
-        let Some(call) = self.keeper() else {
+        if !self.keeps_files() {
             return Outputs::write(folder, existing, of, list);
-        };
+        }
         let files = Outputs::contents(of.0, Some(of.1), list)?;
         let names = files.iter().map(|(name, _)| name.into()).collect();
-        call.answer().files.extend(files);
+        self.answer().files.extend(files);
         Ok(names)
     }
 
@@ -236,16 +228,16 @@ impl Cli {
         let name = path
             .file_name()
             .and_then(|name| name.to_str())
-            .filter(|_| self.keeper().is_none());
+            .filter(|_| !self.keeps_files());
         Ok(existing.check(path.parent().unwrap_or(Path::new("")), name)?)
     }
 
     /// Writes a file, or keeps it.
     pub(super) fn write_file(&self, path: &Path, content: String) -> Result<(), Error> {
-        let Some(call) = self.keeper() else {
+        if !self.keeps_files() {
             return Ok(write_atomic(path, content)?);
-        };
-        call.answer()
+        }
+        self.answer()
             .files
             .push((path.display().to_string(), content.into()));
         Ok(())

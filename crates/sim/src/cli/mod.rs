@@ -34,7 +34,7 @@ use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::Mutex;
 use wakescope_optics::plan::Model;
 
 pub use host::{Answer, Host, Refusal, call, refusal};
@@ -58,9 +58,12 @@ struct Cli {
     /// Print the result, or the error, as one JSON object.
     #[arg(long, global = true)]
     json: bool,
-    /// The program that runs the command, and what it gets.
+    /// The program that runs the command.
     #[arg(skip)]
-    call: Option<Arc<host::Call>>,
+    host: Option<Host>,
+    /// What that program receives.
+    #[arg(skip)]
+    answer: Mutex<Answer>,
     /// Long names of the options that the command line states.
     #[arg(skip)]
     given: Vec<String>,
@@ -339,7 +342,7 @@ fn check(args: &CheckArgs, cli: &Cli) -> Result<(), Error> {
     }
     let ranges_m = scan_ranges_m(plan.scene());
     let snr_db = snr_without_screens_db(&plan, &ranges_m)?;
-    // What only phase screens could tell is not told.
+    // What only phase screens could give is not printed.
     let is_less = plan.runs(Stage::PhaseScreens) && model(plan.scene()) == Model::MonteCarlo;
     let mut object = plan_json(&plan);
     object["budget"] =

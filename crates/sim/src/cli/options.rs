@@ -50,7 +50,7 @@ pub(super) const IN_MEMORY: &Idle = &[
     ("variable", ARRAY),
     ("quadrature", ARRAY),
 ];
-const ARRAY: &str = "an array says itself how its numbers stand";
+const ARRAY: &str = "an array says itself how its numbers are stored";
 
 /// Of the method of radial velocities.
 pub(super) const BY_RADIAL_VELOCITIES: &Idle = &[
@@ -178,7 +178,7 @@ fn given(command: &clap::Command, matches: &ArgMatches) -> Vec<String> {
     let mut given = Vec::new();
     for argument in command.get_arguments() {
         let id = argument.get_id().as_str();
-        // Help is no match that can be asked for.
+        // Help is no match that can be requested.
         let source = matches
             .try_contains_id(id)
             .ok()

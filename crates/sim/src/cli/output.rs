@@ -17,8 +17,8 @@ pub(super) fn print(text: &str) -> Result<(), Error> {
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(source) if source.kind() != ErrorKind::BrokenPipe => {
             // Results are printed last.
-            let told = format!("{source}; the files of this command are in place");
-            let source = std::io::Error::new(source.kind(), told);
+            let message = format!("{source}; the files of this command are in place");
+            let source = std::io::Error::new(source.kind(), message);
             Err(Error::Io {
                 action: "write to",
                 path: "standard output".into(),

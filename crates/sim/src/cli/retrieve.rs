@@ -251,7 +251,7 @@ pub(super) fn retrieve(args: &RetrieveArgs, cli: &Cli) -> Result<(), Error> {
     )
 }
 
-/// What is found in the scans of all files, `count` in number; of several those that cannot be fitted are left out with a warning.
+/// Fits the scans of all files, `count` in number; of several those that cannot be fitted are skipped with a warning.
 fn of_inputs(
     args: &RetrieveArgs,
     inputs: Vec<Input>,
@@ -270,7 +270,7 @@ fn of_inputs(
             match of_map(args, scene.as_ref(), scan, start, observer) {
                 Ok(one) => found.scans.push(one),
                 Err(error) if count > 1 && is_of_the_file(&error) => {
-                    observer.warn(&format!("{error}: left out"));
+                    observer.warn(&format!("{error}: skipped"));
                     refused = refused.or(Some(error));
                 }
                 Err(error) => return Err(error),

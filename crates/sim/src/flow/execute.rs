@@ -51,7 +51,7 @@ pub fn check_on(
     }
     let (setup, _, _, mut forecast) =
         prepare(file, folder.unwrap_or(Path::new("")), options, ranks)?;
-    // A run tells of these itself, as it goes.
+    // A run reports these itself.
     let growth = setup.stability().undamped(forecast.step_s);
     let is_modelled = setup.settings.subgrid != SubgridModel::None;
     let noticed = growth.filter(|g| !is_modelled && g.rate_per_s * forecast.end_s > NOTICED_GROWTH);

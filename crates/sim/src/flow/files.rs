@@ -41,7 +41,7 @@ impl OutputFile {
         format!("{}_{:04}.nc", self.stem, self.index + 1)
     }
 
-    /// Its size, about, of a flow of so many cells \[bytes\].
+    /// Its approximate size for a flow with these numbers of cells \[bytes\].
     fn bytes(&self, cells: f64, plane: f64, variables: f64) -> f64 {
         match (self.plane, self.format) {
             (None, FileFormat::InitialNetcdf) => cells * 24.0,
@@ -133,7 +133,7 @@ impl Files {
         out
     }
 
-    /// Number and size of the files of a run of so many steps, those of all outputs together.
+    /// Number and size of the files of a run by its steps, those of all outputs together.
     pub(super) fn forecast(
         &self,
         cells: [usize; 3],

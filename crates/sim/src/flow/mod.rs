@@ -60,7 +60,7 @@ impl Content for FlowCase {
     }
 
     fn seed(&self) -> u64 {
-        // 0 stands for noise by a closed formula, and for none.
+        // 0 means noise by a closed formula, or none.
         if let CaseKind::Wake(wake) = &self.case {
             wake.seed.unwrap_or(0)
         } else {
@@ -89,7 +89,7 @@ impl CaseFile {
         Ok(Self::of(text::read(text, path, base.as_ref())?, path, text))
     }
 
-    /// The same case with another end: the age `tau` of a wake, of other flows a time \[s\]. Outputs behind it are left out.
+    /// The same case with another end: the age `tau` of a wake, of other flows a time \[s\]. Outputs behind it are skipped.
     ///
     /// # Errors
     /// An end that is no finite number above 0.
@@ -139,7 +139,7 @@ impl CaseFile {
     }
 }
 
-/// Age of a wake of a time, without the last digits, in which the age that was asked for may not come back.
+/// Age of a wake at a time, without the last digits, in which it may differ from the requested age.
 fn age_tau(time_s: f64, tau_per_s: f64) -> f64 {
     crate::quantities::rounded(time_s * tau_per_s, 13)
 }

@@ -28,7 +28,7 @@ const MORE_EXAMPLES: &str = include_str!("more_examples.toml");
 /// Keys whose value chooses the others of their table.
 const TAGS: [&str; 3] = ["kind", "from", "model"];
 
-/// The case that a text stands for. Keys that it lacks are those of `base`, or the defaults of its kind.
+/// The case of a text. Keys that it lacks are those of `base`, or the defaults of its kind.
 ///
 /// # Errors
 /// The file, the line, the key, the value and what is allowed.

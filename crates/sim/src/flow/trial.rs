@@ -115,7 +115,7 @@ pub(crate) fn history_of(file: &CaseFile, observer: &dyn Observer) -> Result<His
     let mut run = Run::new(flow, plan).map_err(Error::Flow)?;
     run.to_end(&mut recorder).map_err(Error::Flow)?;
     let mut history = recorder.history;
-    // What the flow dissipates at its end only a step more would tell.
+    // The dissipation at the end would need one more step.
     history[1].resize(history[0].len(), f64::NAN);
     Ok(history)
 }

@@ -33,10 +33,10 @@ fn parted(bytes: &[u8], is_wake: bool) -> (&[u8], &[u8]) {
     rest.split_at_checked(length).unwrap_or_default()
 }
 
-/// Parts of the simulated time of which an observer is told.
+/// Parts of the simulated time that an observer is notified of.
 pub(super) const DIVISIONS: f64 = 10_000.0;
 
-/// Writes what the run gives, on each rank what that has; tables, and what is told, on rank 0.
+/// Writes the results of a run, on each rank those that it has; tables and reports on rank 0.
 pub(super) struct Writer<'a> {
     pub(super) ranks: Arc<dyn Ranks>,
     pub(super) files: Files,

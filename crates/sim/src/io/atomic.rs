@@ -1,4 +1,4 @@
-//! Puts files on disk so that none is ever seen half-written, and a run's files appear all together or not at all.
+//! Puts files on disk so that no program finds one half-written, and a run's files appear all together or not at all.
 //! A group is staged in a hidden folder inside the target folder (same file system), each file synced, then renamed into place;
 //! if a rename fails, the earlier ones are undone and replaced files come back.
 //! Check: the tests provoke a failure at each step and list the folder afterwards.

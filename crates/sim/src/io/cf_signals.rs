@@ -5,7 +5,7 @@
 use super::error::OutputResult;
 use super::netcdf::{Data, Layout, described};
 use super::provenance::Provenance;
-use super::signals::{RawSignals, Recording};
+use super::signals::RawSignals;
 
 /// The file's bytes.
 ///
@@ -33,7 +33,7 @@ pub fn cf_signals_bytes(
         ("radial_velocity", Data::filled(signals.radial_velocity_m_s)),
     ];
     values.extend(record_numbers(signals, records));
-    values.extend(recording_values(&signals.recording));
+    values.extend(recording_values(signals));
     if !signals.azimuth_rad.is_empty() {
         let azimuth_rad = repeated(&signals.azimuth_rad, records);
         values.push(("azimuth", Data::f64(azimuth_rad)));
@@ -78,18 +78,15 @@ fn record_numbers(signals: &RawSignals<'_>, records: usize) -> [(&'static str, D
 }
 
 /// How the signals were recorded.
-fn recording_values(recording: &Recording) -> [(&'static str, Data); 7] {
+fn recording_values(signals: &RawSignals<'_>) -> [(&'static str, Data); 7] {
     [
-        ("sampling_frequency", recording.sampling_hz),
-        (
-            "intermediate_frequency",
-            recording.intermediate_frequency_hz,
-        ),
-        ("bandwidth", recording.bandwidth_hz),
-        ("wavelength", recording.wavelength_m),
-        ("pulse_repetition_frequency", recording.pulse_repetition_hz),
-        ("pulse_sigma", recording.pulse_sigma_s),
-        ("noise_power", recording.noise_power_a2),
+        ("sampling_frequency", signals.sampling_hz),
+        ("intermediate_frequency", signals.intermediate_frequency_hz),
+        ("bandwidth", signals.bandwidth_hz),
+        ("wavelength", signals.wavelength_m),
+        ("pulse_repetition_frequency", signals.pulse_repetition_hz),
+        ("pulse_sigma", signals.pulse_sigma_s),
+        ("noise_power", signals.noise_power_a2),
     ]
     .map(|(name, value)| (name, Data::f64([value])))
 }
@@ -108,7 +105,7 @@ fn repeated(values: &[f64], records: usize) -> Vec<f64> {
     all
 }
 
-/// Bytes of data that the file has with so many pulses of so many samples, of one or two quadratures, and lines of so many
+/// Bytes of data in the file for these numbers of pulses, of samples of one or two quadratures, and of lines and their
 /// ranges.
 pub(crate) fn data_bytes(
     [pulses, samples, quadratures]: [f64; 3],

@@ -24,7 +24,7 @@ pub fn cfradial_bytes(map: &VelocityMap, provenance: &Provenance) -> OutputResul
     layout(map, provenance)?.into_bytes(provenance)
 }
 
-/// Bytes of data of a run's map with so many rays and gates, rounded up: 16 fields, and what each ray has.
+/// Bytes of data of a run's map with this number of rays and gates, rounded up: 16 fields, and what each ray has.
 pub(crate) fn data_bytes(rays: f64, gates: f64) -> f64 {
     64.0 * rays * gates + 64.0 * rays + 4.0 * gates + 4096.0
 }
@@ -353,7 +353,7 @@ fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
             .find_map(|name| map.field(name));
         let source = source.ok_or_else(|| OutputError::Missing {
             what: "field radial_velocity".into(),
-            needed: "a CfRadial file needs it, or one of v_gate, v_pulse, v_exact to stand for it"
+            needed: "a CfRadial file needs it, or one of v_gate, v_pulse, v_exact in its place"
                 .into(),
         })?;
         let copy = Field::float(

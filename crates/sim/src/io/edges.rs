@@ -26,7 +26,7 @@ fn side_text(side: Side) -> String {
     }
 }
 
-/// The ends that a text stands for; `None` if it is no such text.
+/// The ends of an axis from their text; `None` for any other text.
 pub(crate) fn from_text(text: &str) -> Option<Edges> {
     if let Some(period) = text.strip_prefix("periodic ") {
         return Some(Edges::Periodic {

@@ -14,7 +14,7 @@ pub enum OutputError {
         field: String,
         /// What it has to match.
         axis: String,
-        /// Length asked for.
+        /// Length needed.
         expected: usize,
         /// Length found.
         actual: usize,

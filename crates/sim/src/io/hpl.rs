@@ -11,7 +11,7 @@ use crate::SPEED_OF_LIGHT_M_S;
 use crate::beams::SweepMode;
 use ndarray::Array2;
 
-/// No instrument has the number 0: with the file's own name it is all by which this program's files can be told, for readers
+/// No instrument has the number 0: with the file's own name it is all by which this program's files can be recognised, for readers
 /// refuse every other remark.
 pub(super) const SYSTEM_ID: &str = "System ID:\t0";
 
@@ -164,7 +164,7 @@ fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
     Ok((gate_m, before as usize))
 }
 
-/// The head of the file; its focus range 65535 stands for a collimated beam, where readers ask for an integer.
+/// The head of the file; its focus range 65535 means a collimated beam, where readers ask for an integer.
 fn header(
     map: &VelocityMap,
     name: &str,

@@ -162,7 +162,7 @@ pub struct PulseInfo {
     pub prt_s: f64,
     /// Pulse duration, s.
     pub pulse_width_s: f64,
-    /// Largest velocity of either sign that the samples tell from others, m/s.
+    /// Largest velocity of either sign that is unambiguous (Nyquist velocity), m/s.
     pub nyquist_velocity_m_s: f64,
     /// Samples per second.
     pub sampling_hz: f64,

@@ -17,7 +17,7 @@ const LARGEST_VARIABLE: u64 = u32::MAX as u64 - 3;
 /// Stored in place of a missing float.
 pub(crate) const FILL: f32 = -9999.0;
 
-/// Values of a variable or of an attribute as they stand in the file, without what fills the last word.
+/// Values of a variable or of an attribute as the file stores them, without what fills the last word.
 pub(crate) struct Data {
     /// Code of their type in the format.
     code: usize,
@@ -113,8 +113,8 @@ impl Variable {
     }
 }
 
-/// Variables as `cdl` describes them in the notation of `ncdump`, in its order: their dimensions and attributes. Values stand by the name
-/// of their variable; variables without are left out. An attribute `?` has the value of the name `variable:attribute`, or is left out, too.
+/// Variables as `cdl` describes them in the notation of `ncdump`, in its order: their dimensions and attributes. Values have the name
+/// of their variable; variables without values are skipped. An attribute `?` has the value of the name `variable:attribute`, or is skipped.
 pub(crate) fn described(
     cdl: &'static str,
     values: impl IntoIterator<Item = (&'static str, Data)>,
@@ -261,7 +261,7 @@ impl Layout {
         count
     }
 
-    /// Checks the lengths, and that readers can take names for such and tell them apart.
+    /// Checks the lengths, and that names are valid and differ.
     fn check(&self) -> OutputResult<()> {
         for (place, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;

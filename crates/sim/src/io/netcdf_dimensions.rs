@@ -203,7 +203,7 @@ impl NetcdfFile {
             .collect())
     }
 
-    /// Times in seconds, from the unit of a variable; a date from which they count is left out.
+    /// Times in seconds, from the unit of a variable; a date from which they count is ignored.
     ///
     /// # Errors
     /// As [`Self::floats`]; a unit that is no time.

@@ -19,7 +19,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Deflate makes no more than so many bytes of one.
+/// Largest factor by which deflate compresses.
 const MOST_EXPANDED: f64 = 1032.0;
 
 /// What the library of NetCDF stores where no float was written.
@@ -27,7 +27,7 @@ pub(crate) const DEFAULT_FILL: f64 = 9.969_209_968_386_869e36;
 
 const OTHER: &str = "it is no NetCDF file; classic NetCDF is needed, from xarray with to_netcdf(\"out.nc\", \
                      format=\"NETCDF3_64BIT\")";
-/// What is said of a file that the library does not read: its own words would tell bytes of a file that may be anything.
+/// Messages of a file that the library does not read: its own would repeat bytes of a file that may be anything.
 const UNSOUND: &str =
     "it is no sound NetCDF file: its header is damaged, or counts more than the file holds";
 const UNSOUND_HDF5: &str = "it is NetCDF-4 (HDF5), but damaged or of a kind that is not read: nccopy -k nc6 in.nc out.nc makes classic \
@@ -383,7 +383,7 @@ impl NetcdfFile {
         Ok(())
     }
 
-    /// Why a variable cannot be read, in words that tell nothing of the file but the number of its filter.
+    /// Why a variable cannot be read, without anything of the file but the number of its filter.
     fn unreadable(&self, name: &str, error: &str) -> String {
         let is_hdf5 = matches!(self.file.format(), NcFormat::Nc4 | NcFormat::Nc4Classic);
         let filter = error
@@ -429,11 +429,11 @@ const FILTERS: [(&str, &str); 8] = [
     ("32026", "Blosc2"),
 ];
 
-/// The values that the stored numbers of a variable stand for; NaN for those that are missing.
+/// The values of the stored numbers of a variable; NaN for those that are missing.
 fn unpacked(variable: &NcVariable, mut values: ArrayD<f64>) -> ArrayD<f64> {
     let sign = SignParams::from_variable(variable);
     let packing = UnpackParams::from_variable(variable);
-    // Limits in the type of the packed numbers are about these, others about what they stand for (NetCDF User's Guide, A.1).
+    // Limits in the type of the packed numbers are about these, others about the values (NetCDF User's Guide, A.1).
     let is_packed = packing.is_some() && !is_float(&variable.dtype);
     let mut of_stored = variable.clone();
     let mut of_values = variable.clone();

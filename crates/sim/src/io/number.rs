@@ -1,10 +1,10 @@
-//! How numbers stand in binary files, and reading them.
+//! Number types of binary files.
 //!
 //! Check: every kind comes back from its bytes in both orders.
 
 use std::collections::BTreeMap;
 
-/// Attributes that say which numbers stand for which values, and which for none.
+/// Attributes that define how stored numbers are converted to values, and which are missing.
 pub(super) const PACKING: [&str; 8] = [
     "_FillValue",
     "_Unsigned",
@@ -65,7 +65,7 @@ impl NumberType {
         self.kind == 'f'
     }
 
-    /// The code that stands for zero: the middle one of a converter that counts without sign, of which none has 64 bits.
+    /// The code of zero: the middle one of a converter with unsigned codes, of which none has 64 bits.
     pub(crate) fn zero(self) -> f64 {
         match self.kind {
             'u' if self.bytes <= 4 => middle_code(8 * self.bytes as i32),

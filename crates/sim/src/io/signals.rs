@@ -4,9 +4,9 @@
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use ndarray::ArrayView2;
 
-/// How the signals of a scan were recorded.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Recording {
+/// The signals of a scan, pulse by pulse, one realisation after the other; the large arrays are borrowed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawSignals<'a> {
     /// Sampling frequency, Hz.
     pub sampling_hz: f64,
     /// Frequency of air at rest in the records, Hz: 0 for baseband signals.
@@ -21,13 +21,6 @@ pub struct Recording {
     pub pulse_sigma_s: f64,
     /// Mean square of the noise of a sample, of both quadratures together, A^2.
     pub noise_power_a2: f64,
-}
-
-/// The signals of a scan, pulse by pulse, one realisation after the other; the large arrays are borrowed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RawSignals<'a> {
-    /// How they were recorded.
-    pub recording: Recording,
     /// Ranges of the air along the lines of sight, which an estimate is to be held against, m, increasing.
     pub range_m: Vec<f64>,
     /// Radial velocity of that air `[line, range]`, m/s, positive away from the lidar; NaN where nothing returns light.
@@ -44,7 +37,7 @@ pub struct RawSignals<'a> {
     pub azimuth_rad: Vec<f64>,
     /// Time of each sample after the middle of the pulse left, s; increasing.
     pub time_s: Vec<f64>,
-    /// First pulse of each line of sight in one realisation; the pulses of a line stand together.
+    /// First pulse of each line of sight in one realisation; the pulses of a line follow each other.
     pub first_pulse: Vec<usize>,
 }
 
@@ -106,15 +99,13 @@ pub(crate) fn example() -> RawSignals<'static> {
         [70.0, 71.0, 72.0],
     ];
     RawSignals {
-        recording: Recording {
-            sampling_hz: 1e6,
-            intermediate_frequency_hz: 8e5,
-            bandwidth_hz: 5e5,
-            wavelength_m: 1.5e-6,
-            pulse_repetition_hz: 400.0,
-            pulse_sigma_s: 1.2e-7,
-            noise_power_a2: 3e-13,
-        },
+        sampling_hz: 1e6,
+        intermediate_frequency_hz: 8e5,
+        bandwidth_hz: 5e5,
+        wavelength_m: 1.5e-6,
+        pulse_repetition_hz: 400.0,
+        pulse_sigma_s: 1.2e-7,
+        noise_power_a2: 3e-13,
         range_m: vec![100.0, 130.0],
         radial_velocity_m_s: ndarray::aview2(&[[1.5, -2.5], [f64::NAN, 0.5]]),
         pulse_time_s: vec![8.0, 8.0025, 8.005, 8.0075],

@@ -1,4 +1,4 @@
-//! Variables of measurements in SI, whichever file has them: their names, their units, and what stands beside them for each ray or
+//! Variables of measurements in SI, whichever file has them: their names, their units, and other values of each ray or
 //! sweep.
 //!
 //! A file is a [`VariableSource`]: NetCDF, whose numbers come unpacked, or a table, whose columns have their units in their names. Variables
@@ -533,7 +533,7 @@ fn times_of_numbers(source: &dyn VariableSource, name: &str) -> Result<Times, St
 }
 
 /// The date from which a variable counts time, with the fraction of a second beyond it: that in its units, or that of a text of the file
-/// whose name stands there.
+/// that it names.
 pub(crate) fn reference(source: &dyn VariableSource, name: &str) -> Option<(UtcTime, f64)> {
     let calendar = source.attribute(name, "calendar").unwrap_or_default();
     let is_civil = ["", "standard", "gregorian", "proleptic_gregorian"]

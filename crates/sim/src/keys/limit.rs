@@ -1,4 +1,4 @@
-//! Limits of single keys, which stand beside their defaults where they are declared, and the one validator of scenes and cases, which
+//! Limits of single keys, which are declared beside their defaults, and the one validator of scenes and cases, which
 //! collects every value that is out of its limits.
 //!
 //! Check: each limit of a scene and of a case is broken once, and the refusal names its key.
@@ -23,7 +23,7 @@ pub(crate) struct Is<T, W>(pub(crate) fn(&T) -> bool, pub(crate) W);
 /// A name that has to be stated, and what it names.
 pub(crate) struct Named(pub(crate) &'static str);
 
-/// Above 0; `inf` stands for none.
+/// Above 0; `inf` means none.
 pub(crate) const ABOVE_ZERO_OR_INF: Number =
     Number(|value| value > 0.0, "above 0 {}, or inf for none");
 /// Above 0.
@@ -145,7 +145,7 @@ impl<'s> Checker<'s> {
         }
     }
 
-    /// What was found, in the order in which it was asked for.
+    /// What was found, in the order of the checks.
     pub(crate) fn into_problems(self) -> Vec<Problem> {
         self.found
     }

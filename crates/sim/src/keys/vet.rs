@@ -1,4 +1,4 @@
-//! A text beside the description of its keys: what does not fit, the table that it stands for, and the lines of problems that are found
+//! A text and the description of its keys: what does not fit, the table of the text, and the lines of problems that are found
 //! later.
 
 use super::declare::{Declared, from_table};
@@ -67,7 +67,7 @@ impl<'a> Text<'a> {
 
     /// The line of a key, from 1; none if the text does not state it.
     pub(crate) fn line(&self, path: &str) -> Option<usize> {
-        // The values of a list stand where it does.
+        // The values of a list have its line.
         let path = if path.ends_with(']') {
             path.split_once('[')?.0
         } else {
@@ -99,7 +99,7 @@ impl<'a> Text<'a> {
         is_plain.then(|| self.quote(value.span()))
     }
 
-    /// The table that the text stands for, with the kinds that it leaves out.
+    /// The table of the text, with the kinds that it omits.
     ///
     /// # Errors
     /// Every key that is not known, has a value of the wrong kind or is missing, in the order of the lines.
@@ -145,7 +145,7 @@ impl<'a> Text<'a> {
         Err(self.invalid(walk.found))
     }
 
-    /// A table whose keys all fit as what it stands for.
+    /// A table whose keys all fit as the value of its type.
     ///
     /// # Errors
     /// A key that does not fit; a table from [`Self::vet`] has none.
@@ -185,7 +185,7 @@ impl<'a> Text<'a> {
     }
 }
 
-/// Where the key with this path stands, and its value; the path may lead through a table of a list.
+/// Position of the key with this path, and its value; the path may lead through a table of a list.
 fn find<'t, 'a>(
     table: &'t DeTable<'a>,
     path: &str,
@@ -261,7 +261,7 @@ type AllKinds = [(&'static str, Vec<Key>)];
 /// The tag of a table, the kind that it has, and all that it may have.
 type Kinds<'k> = (&'k str, &'k str, &'k AllKinds);
 
-/// Where a value stands, and the keys that it has where the text leaves them out.
+/// Path and line of a value, and the keys that it has where the text omits them.
 #[derive(Clone, Copy)]
 struct Place<'p> {
     path: &'p str,
@@ -489,7 +489,7 @@ impl Walk<'_> {
         let hint = match (meant, table_with(self.format.keys, here, "")) {
             (Some(meant), _) => format!("; did you mean {meant}?"),
             (None, Some(table)) if table.is_empty() => {
-                "; it stands before the first [section].".into()
+                "; it belongs before the first [section].".into()
             }
             (None, Some(table)) => format!("; it is a key of [{table}]."),
             (None, None) => ".".into(),

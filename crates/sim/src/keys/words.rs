@@ -5,7 +5,7 @@ use super::key::{Key, Kind, join};
 /// Longest piece of a file that a message repeats, in characters.
 const LONGEST_QUOTE: usize = 60;
 
-/// Endings of names and the units that they stand for, longer ones first.
+/// Endings of names and their units, longer ones first.
 const UNITS: &str = include_str!("units.csv");
 
 /// The unit of a key by its name.

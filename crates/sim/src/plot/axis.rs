@@ -8,7 +8,7 @@ use crate::io::{OutputError, OutputResult};
 pub struct Axis {
     /// Quantity and unit, such as `range [m]`; `^{...}` raises and `_{...}` lowers a part.
     pub label: String,
-    /// Logarithmic scale: values that are not positive are left out.
+    /// Logarithmic scale: values that are not positive are skipped.
     pub log: bool,
     /// First and last value; from the data where absent.
     pub range: Option<(f64, f64)>,
@@ -122,7 +122,7 @@ impl Scale<'_> {
         self.paper.0 + part.clamp(-20.0, 20.0) * (self.paper.1 - self.paper.0)
     }
 
-    /// End of a range that is longer by so large a part of itself, as seen on the paper.
+    /// End of a range that is longer by this fraction of itself on the paper.
     pub(crate) fn above(&self, part: f64) -> f64 {
         let [low, high] = [self.range.0, self.range.1].map(|v| forth(self.log, v));
         back(self.log, low + (high - low) / (1.0 - part.clamp(0.0, 0.7)))

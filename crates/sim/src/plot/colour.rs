@@ -1,4 +1,4 @@
-//! Colours: a palette for curves that colour-blind readers can tell apart (Okabe and Ito 2008), and two colour maps computed in
+//! Colours: a palette for curves that colour-blind readers can distinguish (Okabe and Ito 2008), and two colour maps computed in
 //! OKLab (Ottosson 2020), in which equal steps look equal.
 //! Check: the diverging map is symmetric in lightness about zero, the sequential one darkens steadily.
 

@@ -84,7 +84,7 @@ pub(crate) enum Shape {
         frame: Frame,
         pixels: Pixmap,
     },
-    /// Shapes of which only the part inside the frame is seen.
+    /// Shapes of which only the part inside the frame is visible.
     Clip {
         frame: Frame,
         shapes: Vec<Shape>,

@@ -45,7 +45,7 @@ pub struct MapPlot {
 
 impl MapPlot {
     /// The picture of a field of sweep `sweep`, one of azimuth as seen from above. Fields named `v_...`, `radial_velocity` and `bias` get
-    /// symmetric colours, others light to dark; the limits are those of the sweep. The lidar is shown where it stands less than
+    /// symmetric colours, others light to dark; the limits are those of the sweep. The lidar is shown where it is less than
     /// half the width of the scan away.
     ///
     /// # Errors
@@ -235,7 +235,7 @@ impl MapPlot {
 
     fn push_marks(&self, x: &Scale<'_>, y: &Scale<'_>, out: &mut Vec<Shape>) {
         if let Some(lidar_m) = self.shown_lidar_m() {
-            // A tripod on the ground, large enough to be seen when the telescope is low.
+            // A tripod on the ground, large enough to be visible when the telescope is low.
             let at = x.place(lidar_m.0);
             let ground = y.place(0.0);
             let apex = (at, y.place(lidar_m.1).min(ground - 13.0));

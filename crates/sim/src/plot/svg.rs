@@ -1,5 +1,5 @@
 //! A drawing as SVG text: letters stay text, a map is an embedded picture, the provenance is in `<metadata>`.
-//! There are no ids, so that several pictures can stand in one page.
+//! There are no ids, so that one page can hold several pictures.
 //! Check: the tests count elements and look for the escapes.
 
 use super::colour::Rgb;

@@ -552,7 +552,7 @@ pub(crate) fn set(table: &mut Table, path: &str, value: Value) {
     inner.map(|table| table.insert(last.into(), value));
 }
 
-/// The number that a name in an expression stands for.
+/// The number of a name in an expression.
 fn value_of(whole: &Value, name: &str) -> Result<f64, String> {
     let key = resolve(name, "").map_err(|problem| problem.to_string())?;
     match value_at(whole, &key.path) {

@@ -1,6 +1,6 @@
 //! From a key as a user writes it to the key of the scene that it names, and from texts to values of it.
 //!
-//! A path may leave out tables in its middle where only one key fits: `pulse.duration_s` is `pulse.shape.duration_s`.
+//! A path may omit tables in its middle where only one key fits: `pulse.duration_s` is `pulse.shape.duration_s`.
 //! Check: every key that can vary is found by its whole path; those that cannot are refused with the reason.
 
 use crate::keys::{Key, Kind, Problem, join, near, one_of};
@@ -52,7 +52,7 @@ fn all() -> &'static [SceneKey] {
     &ALL
 }
 
-/// Whether the tables that `short` names stand in this order in `path`, the first first, before the same last name.
+/// Whether `path` has the tables that `short` names in this order, the first one first, and the same last name.
 fn shortens(short: &str, path: &str) -> bool {
     let mut rest = short.split('.').peekable();
     let mut whole = path.split('.');

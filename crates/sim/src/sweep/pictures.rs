@@ -50,7 +50,7 @@ const PANELS: [(&str, &str, bool, [&str; 2]); 6] = [
     ),
 ];
 
-/// Curves of a panel that a legend can tell apart; more are drawn as points alone.
+/// Most curves of a panel in a legend; more are drawn as points alone.
 const MOST_CURVES: usize = 6;
 
 /// The pictures: of each key that is a number, and the front.

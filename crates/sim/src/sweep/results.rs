@@ -23,7 +23,7 @@ const INSIDE_PART: f64 = 8.0 / 47.0;
 /// Cells beyond this part from both are outside: 30 m of 47.
 const OUTSIDE_PART: f64 = 30.0 / 47.0;
 
-/// Estimates so many widths of a peak away from the air are no estimates of it.
+/// Estimates farther from the wind than this many widths of a peak are no estimates of it.
 const BEYOND_WIDTHS: f64 = 3.0;
 
 /// With some flagged estimates, but fewer than these, outliers may be missing by chance.

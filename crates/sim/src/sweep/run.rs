@@ -299,7 +299,7 @@ fn groups<'s>(scenes: impl Iterator<Item = &'s SceneFile>) -> Vec<Vec<usize>> {
             site: Site::default(),
             ..file.content.clone()
         };
-        // Where pulses have airs of their own, a scan holds what they spread over at the gates.
+        // Where each pulse samples the wind, a scan holds the wind of the pulses at the gates.
         let e = &file.content.estimator;
         let of_pulses = file.content.scan.wind_of_pulses;
         let gates = (of_pulses != WindOfPulses::default())
@@ -337,7 +337,7 @@ fn batches(planned: Vec<(&Case, Plan)>) -> Vec<Vec<(&Case, Plan)>> {
     batches
 }
 
-/// Wall-clock times of the cases that were run, s; they differ from run to run and stand apart from the results.
+/// Wall-clock times of the cases that were run, s; they differ from run to run and are no part of the results.
 fn write_times(
     out: &Path,
     name: &str,

@@ -1,6 +1,6 @@
 //! A sweep on disk: what it is, and a folder for each case with its scene and result.
 //!
-//! A result is there when `result.json` is: it is written last, and put into place by its name. Numbers stand in it as the
+//! A result is there when `result.json` is: it is written last, and put into place by its name. Its numbers are the
 //! texts of the table, so that a table has the same bytes whoever computed its cases. Check: shards, kills, edited files.
 
 use super::cases::{Case, Sweep};

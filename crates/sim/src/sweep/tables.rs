@@ -29,7 +29,7 @@ pub fn merge(
         let asked = sweep.map(|sweep| {
             (
                 Definition::of(sweep, found.circulation),
-                "the sweep that was asked for".into(),
+                "the requested sweep".into(),
             )
         });
         for (other, of) in first.iter().chain(&asked) {

@@ -86,7 +86,7 @@ fn efficiency_curve(
 
 /// The air, one scan of it and the mean of all; below them the errors. One scan alone has its error beside it.
 ///
-/// Sweeps of elevation are seen from the side, those of azimuth from above, the middle one of several; beams of few directions
+/// Sweeps of elevation are drawn from the side, those of azimuth from above, the middle one of several; beams of few directions
 /// are curves over range. A VAD has its sine curve beside it.
 pub(super) fn map(
     plan: &Plan,

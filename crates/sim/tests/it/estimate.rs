@@ -415,7 +415,7 @@ fn arrays_that_numpy_wrote_are_read_by_name() {
         (records.records, records.samples, records.is_complex),
         (4, 6, false)
     );
-    assert_eq!(records.about.elevation_rad, Some(vec![0.1, 0.1, 0.2, 0.2]));
+    assert_eq!(records.elevation_rad, Some(vec![0.1, 0.1, 0.2, 0.2]));
     let found: Vec<f64> = records.read(1..3).unwrap().iter().map(|z| z.re).collect();
     assert_eq!(found, (6..18).map(f64::from).collect::<Vec<_>>());
 }

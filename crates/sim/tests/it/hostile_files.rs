@@ -99,10 +99,7 @@ fn angles_of_an_archive_that_are_not_those_of_the_records_are_refused() {
         )
     };
     write_npz(&path, &[signals.clone(), angles(2)]);
-    assert_eq!(
-        opened(&path).unwrap().about.elevation_rad,
-        Some(vec![0.1, 0.1])
-    );
+    assert_eq!(opened(&path).unwrap().elevation_rad, Some(vec![0.1, 0.1]));
     for count in [0, 1, 3, 4] {
         write_npz(&path, &[signals.clone(), angles(count)]);
         let message = opened(&path).unwrap_err();

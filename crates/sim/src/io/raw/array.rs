@@ -1,4 +1,4 @@
-//! Records that stand in a file as one array of numbers, read by places: no more is in memory than what was asked for.
+//! Records that are one array of numbers in a file, read piece by piece: no more is in memory than what is requested.
 //!
 //! Check: every order of an array gives the same records.
 
@@ -13,7 +13,7 @@ use std::ops::Range;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Order {
-    /// \[line, pulse, sample\]: the pulses of a line stand together, and the samples of a pulse.
+    /// \[line, pulse, sample\]: the pulses of a line follow each other, and the samples of a pulse.
     #[default]
     LineMajor,
     /// \[pulse, line, sample\]: each scan has one pulse a line.
@@ -26,7 +26,7 @@ pub enum Order {
 #[derive(Debug)]
 pub(super) struct ArrayInFile {
     pub(super) file: File,
-    /// Where its numbers begin, and how they stand; complex ones as pairs, the first quadrature before the second.
+    /// Where its numbers begin and how they are stored; complex ones as pairs, the first quadrature before the second.
     pub(super) stored: StoredArray,
     pub(super) order: Order,
     pub(super) records: usize,

@@ -28,7 +28,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use wakescope_estimate::window::FILL_VALUES;
 
-/// How the numbers of a file stand, as far as the file does not say it.
+/// How the numbers of a file are stored, as far as the file does not say it.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct RawFormat {
@@ -97,24 +97,9 @@ impl RawFormat {
 #[cfg(feature = "cli")]
 const KINDS: [&str; 8] = ["i8", "u8", "i16", "u16", "i32", "u32", "f32", "f64"];
 
-/// What a file says of its records.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct About {
-    /// Elevation of each record, rad.
-    pub elevation_rad: Option<Vec<f64>>,
-    /// Time of each record, s.
-    pub time_s: Option<Vec<f64>>,
-    /// Number of the line of each record.
-    pub line: Option<Vec<f64>>,
-    /// Constants of the recording by their names in `signals.nc`.
-    pub constants: BTreeMap<&'static str, f64>,
-    /// The scene that the signals were simulated for.
-    pub scene_toml: Option<String>,
-}
-
 /// Where samples come from.
 pub trait RecordSource: std::fmt::Debug {
-    /// Some samples of some records as they stand there, one record after the other; the second parts of real ones are of no matter.
+    /// Some samples of some records as they are stored, one record after the other; the second parts of real ones are ignored.
     ///
     /// # Errors
     /// Why they cannot be read.
@@ -128,7 +113,7 @@ pub trait RecordSource: std::fmt::Debug {
 /// Records of samples, in a file or in the memory of a program.
 #[derive(Debug)]
 pub struct RawRecords {
-    /// The file, or what stands for one in words and messages.
+    /// The file, or its name in messages.
     pub path: PathBuf,
     source: Box<dyn RecordSource + Send>,
     /// Number of records.
@@ -139,11 +124,11 @@ pub struct RawRecords {
     pub is_complex: bool,
     /// Whether the numbers are codes of a converter.
     pub are_integers: bool,
-    /// Stand for a missing number.
+    /// Values of missing numbers.
     fills: Vec<f64>,
     /// The factor that the numbers of the source have had.
     packed_scale: f64,
-    /// The number that stands for zero, which is subtracted before the scale: the middle code of a converter without sign.
+    /// The stored number of zero, which is subtracted before scaling: the middle code of a converter without sign.
     pub zero: f64,
     /// What its numbers are multiplied with, A for signals in counts.
     pub scale: f64,
@@ -152,8 +137,16 @@ pub struct RawRecords {
     /// Whether frequencies rise with velocities towards the lidar; samples are read with their
     /// spectrum reversed.
     pub is_reversed: bool,
-    /// What the file says of them.
-    pub about: About,
+    /// Elevation of each record, rad, if the file has it.
+    pub elevation_rad: Option<Vec<f64>>,
+    /// Time of each record, s.
+    pub time_s: Option<Vec<f64>>,
+    /// Number of the line of each record.
+    pub line: Option<Vec<f64>>,
+    /// Constants of the recording by their names in `signals.nc`.
+    pub constants: BTreeMap<&'static str, f64>,
+    /// The scene that the signals were simulated for.
+    pub scene_toml: Option<String>,
 }
 
 impl RawRecords {
@@ -172,22 +165,15 @@ impl RawRecords {
         format
             .refuse_unused(&magic)
             .map_err(|reason| Error::input(path, reason))?;
-        let numbers = Numbers {
-            path,
-            format,
-            samples,
-            pulses_per_line,
-        };
         let found = match &magic[..] {
-            _ if format.number.is_some() => numbers
-                .binary(length)
-                .and_then(|array| numbers.records(file, array)),
+            _ if format.number.is_some() => binary_array(format, samples, length)
+                .and_then(|array| records_of_array(path, format, pulses_per_line, file, array)),
             [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
                 Ok(netcdf::read(path, format)?)
             }
             [0x93, b'N', b'U', b'M', ..] => StoredArray::read(&mut file, 0, length)
-                .and_then(|array| numbers.records(file, array)),
-            [b'P', b'K', 3, 4, ..] => numbers.archive(file, length),
+                .and_then(|array| records_of_array(path, format, pulses_per_line, file, array)),
+            [b'P', b'K', 3, 4, ..] => archive(path, format, pulses_per_line, file, length),
             _ => Err(
                 "it is neither NetCDF, NPY nor NPZ; --format names the numbers of a binary file, \
                  e.g. --format i16 --byte-order little"
@@ -213,7 +199,7 @@ impl RawRecords {
         Ok(found)
     }
 
-    /// Records of so many samples that a source has; `are_integers` says that the numbers are codes of a converter.
+    /// Records of a source by their number and their samples; `are_integers` says that the numbers are codes of a converter.
     pub fn new(
         path: &Path,
         source: impl RecordSource + Send + 'static,
@@ -239,7 +225,11 @@ impl RawRecords {
             scale: 1.0,
             outsized: f64::INFINITY,
             is_reversed: false,
-            about: About::default(),
+            elevation_rad: None,
+            time_s: None,
+            line: None,
+            constants: BTreeMap::new(),
+            scene_toml: None,
         }
     }
 
@@ -306,7 +296,7 @@ impl RawRecords {
         Ok(found)
     }
 
-    /// What a stored number stands for; NaN of a missing one.
+    /// The value of a stored number; NaN for a missing one.
     fn scaled(&self, stored: f64) -> f64 {
         if self.fills.contains(&stored) {
             f64::NAN
@@ -342,162 +332,164 @@ fn duplicate(file: &File) -> Result<File, String> {
     file.try_clone().map_err(|e| e.to_string())
 }
 
-/// A file of numbers that stand as a format and a scene say, as far as it does not say it.
-#[derive(Clone, Copy)]
-struct Numbers<'a> {
-    path: &'a Path,
-    format: &'a RawFormat,
-    /// Samples of a record and pulses of a line of sight, as the scene has them.
-    samples: usize,
-    pulses_per_line: usize,
+/// A file of nothing but numbers behind a header.
+fn binary_array(format: &RawFormat, samples: usize, length: u64) -> Result<StoredArray, String> {
+    let name = format.number.as_deref().unwrap_or_default();
+    let number = NumberType::named(name)
+        .ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
+    let array = StoredArray {
+        number,
+        byte_order: format.byte_order,
+        is_complex: format.complex,
+        fortran_order: false,
+        shape: Vec::new(),
+        begin: format.header_bytes,
+    };
+    let sample_bytes = array.sample_bytes();
+    let record_bytes = samples as u64 * sample_bytes;
+    let data = length.checked_sub(format.header_bytes);
+    let data = data.ok_or_else(|| {
+        format!(
+            "it has {length} bytes, --header-bytes says {}",
+            format.header_bytes
+        )
+    })?;
+    let rest = data.checked_rem(record_bytes).unwrap_or(data);
+    if rest != 0 {
+        return Err(format!(
+            "behind a header of {} bytes it holds {data} bytes, no whole number of records of {} samples of {sample_bytes} bytes: {rest} \
+         are left over; scan.range_min_m and range_max_m say how many samples a record has",
+            format.header_bytes, samples
+        ));
+    }
+    let mut lengths = vec![data.checked_div(record_bytes).unwrap_or(0), samples as u64];
+    if format.order == Order::SampleMajor {
+        lengths.reverse();
+    }
+    Ok(StoredArray {
+        shape: lengths,
+        ..array
+    })
 }
 
-impl Numbers<'_> {
-    /// A file of nothing but numbers behind a header.
-    fn binary(self, length: u64) -> Result<StoredArray, String> {
-        let Self {
-            format, samples, ..
-        } = self;
-        let name = format.number.as_deref().unwrap_or_default();
-        let number = NumberType::named(name)
-            .ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
-        let array = StoredArray {
-            number,
-            byte_order: format.byte_order,
-            is_complex: format.complex,
-            fortran_order: false,
-            shape: Vec::new(),
-            begin: format.header_bytes,
-        };
-        let sample_bytes = array.sample_bytes();
-        let record_bytes = samples as u64 * sample_bytes;
-        let data = length.checked_sub(format.header_bytes);
-        let data = data.ok_or_else(|| {
-            format!(
-                "it has {length} bytes, --header-bytes says {}",
-                format.header_bytes
-            )
-        })?;
-        let rest = data.checked_rem(record_bytes).unwrap_or(data);
-        if rest != 0 {
-            return Err(format!(
-                "behind a header of {} bytes it holds {data} bytes, no whole number of records of {} samples of {sample_bytes} bytes: {rest} \
-             are left over; scan.range_min_m and range_max_m say how many samples a record has",
-                format.header_bytes, samples
-            ));
-        }
-        let mut lengths = vec![data.checked_div(record_bytes).unwrap_or(0), samples as u64];
-        if format.order == Order::SampleMajor {
-            lengths.reverse();
-        }
-        Ok(StoredArray {
-            shape: lengths,
-            ..array
-        })
+/// The records of an array.
+fn records_of_array(
+    path: &Path,
+    format: &RawFormat,
+    pulses_per_line: usize,
+    file: File,
+    mut stored: StoredArray,
+) -> Result<RawRecords, String> {
+    let mut lengths = std::mem::take(&mut stored.shape);
+    let pairs =
+        format.complex && !stored.is_complex && lengths.len() > 1 && lengths.last() == Some(&2);
+    if pairs {
+        lengths.pop();
+        stored.is_complex = true;
     }
+    let is_fortran = stored.fortran_order && lengths.len() > 1;
+    if is_fortran && (pairs || lengths.len() > 2) {
+        return Err("it is an array in the order of Fortran: numpy.ascontiguousarray makes one that is read".into());
+    }
+    if is_fortran && format.order != Order::default() {
+        return Err(
+            "--order has no effect: the array says itself that it is in the order of Fortran"
+                .into(),
+        );
+    }
+    let order = if is_fortran {
+        Order::SampleMajor
+    } else {
+        format.order
+    };
+    // Whatever the order, the header says how long each dimension is; the samples are the last, or the first.
+    let are_first = order == Order::SampleMajor && !stored.fortran_order && !lengths.is_empty();
+    let samples = if are_first {
+        Some(lengths.remove(0))
+    } else {
+        lengths.pop()
+    };
+    let samples = samples.ok_or("it holds a single number, no records")? as usize;
+    let records = lengths.iter().product::<u64>() as usize;
+    let is_complex = stored.is_complex;
+    let are_integers = !stored.number.is_float();
+    let zero = stored.number.zero();
+    let array = ArrayInFile {
+        file,
+        stored,
+        order,
+        records,
+        samples,
+        pulses_per_line,
+    };
+    Ok(RawRecords {
+        zero,
+        ..RawRecords::new(path, array, [records, samples], is_complex, are_integers)
+    })
+}
 
-    /// The records of an array.
-    fn records(self, file: File, mut stored: StoredArray) -> Result<RawRecords, String> {
-        let Self {
-            path,
-            format,
-            pulses_per_line,
-            ..
-        } = self;
-        let mut lengths = std::mem::take(&mut stored.shape);
-        let pairs =
-            format.complex && !stored.is_complex && lengths.len() > 1 && lengths.last() == Some(&2);
-        if pairs {
-            lengths.pop();
-            stored.is_complex = true;
-        }
-        let is_fortran = stored.fortran_order && lengths.len() > 1;
-        if is_fortran && (pairs || lengths.len() > 2) {
-            return Err("it is an array in the order of Fortran: numpy.ascontiguousarray makes one that is read".into());
-        }
-        if is_fortran && format.order != Order::default() {
-            return Err(
-                "--order has no effect: the array says itself that it is in the order of Fortran"
-                    .into(),
-            );
-        }
-        let order = if is_fortran {
-            Order::SampleMajor
-        } else {
-            format.order
-        };
-        // Whatever the order, the header says how long each dimension is; the samples are the last, or the first.
-        let are_first = order == Order::SampleMajor && !stored.fortran_order && !lengths.is_empty();
-        let samples = if are_first {
-            Some(lengths.remove(0))
-        } else {
-            lengths.pop()
-        };
-        let samples = samples.ok_or("it holds a single number, no records")? as usize;
-        let records = lengths.iter().product::<u64>() as usize;
-        let is_complex = stored.is_complex;
-        let are_integers = !stored.number.is_float();
-        let zero = stored.number.zero();
-        let array = ArrayInFile {
-            file,
-            stored,
-            order,
-            records,
-            samples,
-            pulses_per_line,
-        };
-        Ok(RawRecords {
-            zero,
-            ..RawRecords::new(path, array, [records, samples], is_complex, are_integers)
-        })
-    }
+/// The records of an archive, with the elevations and times that are in it.
+fn archive(
+    path: &Path,
+    format: &RawFormat,
+    pulses_per_line: usize,
+    mut file: File,
+    length: u64,
+) -> Result<RawRecords, String> {
+    let arrays = numpy::archive(&mut file, length)?;
+    let mut large = arrays.iter().filter(|(_, array)| array.shape.len() > 1);
+    let chosen = match (&format.variable, large.next(), large.next()) {
+        (Some(name), ..) => named_array(&arrays, &[name]),
+        (None, Some(one), None) => Some(one),
+        (None, ..) => named_array(&arrays, &["signals", "current_a"]),
+    };
+    let (_, signals) = chosen
+        .ok_or("it has several arrays, or none: --variable names the one that holds the samples")?;
+    let mut signals = records_of_array(
+        path,
+        format,
+        pulses_per_line,
+        duplicate(&file)?,
+        signals.clone(),
+    )?;
+    let records = signals.records;
+    let elevation = named_array(&arrays, &["elevation_rad", "elevation"]);
+    let time = named_array(&arrays, &["time_s", "pulse_time"]);
+    signals.elevation_rad = values(path, pulses_per_line, &file, elevation, records)?;
+    signals.time_s = values(path, pulses_per_line, &file, time, records)?;
+    Ok(signals)
+}
 
-    /// The records of an archive, with the elevations and times that are in it.
-    fn archive(self, mut file: File, length: u64) -> Result<RawRecords, String> {
-        let arrays = numpy::archive(&mut file, length)?;
-        let mut large = arrays.iter().filter(|(_, array)| array.shape.len() > 1);
-        let chosen = match (&self.format.variable, large.next(), large.next()) {
-            (Some(name), ..) => named_array(&arrays, &[name]),
-            (None, Some(one), None) => Some(one),
-            (None, ..) => named_array(&arrays, &["signals", "current_a"]),
-        };
-        let (_, signals) = chosen.ok_or(
-            "it has several arrays, or none: --variable names the one that holds the samples",
-        )?;
-        let mut signals = self.records(duplicate(&file)?, signals.clone())?;
-        let records = signals.records;
-        let elevation = named_array(&arrays, &["elevation_rad", "elevation"]);
-        let time = named_array(&arrays, &["time_s", "pulse_time"]);
-        signals.about.elevation_rad = self.values(&file, elevation, records)?;
-        signals.about.time_s = self.values(&file, time, records)?;
-        Ok(signals)
+/// The numbers of an array of an archive, one for each record.
+fn values(
+    path: &Path,
+    pulses_per_line: usize,
+    file: &File,
+    array: Option<&(String, StoredArray)>,
+    records: usize,
+) -> Result<Option<Vec<f64>>, String> {
+    let Some((name, array)) = array else {
+        return Ok(None);
+    };
+    let mut lengths = array.shape.iter();
+    let count = lengths.try_fold(1_u64, |count, length| count.checked_mul(*length));
+    let count = count.unwrap_or(u64::MAX);
+    if count != records as u64 {
+        return Err(format!(
+            "{name} has {count} values; one for each of the {records} records is needed"
+        ));
     }
-
-    /// The numbers of an array of an archive, one for each record.
-    fn values(
-        self,
-        file: &File,
-        array: Option<&(String, StoredArray)>,
-        records: usize,
-    ) -> Result<Option<Vec<f64>>, String> {
-        let Some((name, array)) = array else {
-            return Ok(None);
-        };
-        let mut lengths = array.shape.iter();
-        let count = lengths.try_fold(1_u64, |count, length| count.checked_mul(*length));
-        let count = count.unwrap_or(u64::MAX);
-        if count != records as u64 {
-            return Err(format!(
-                "{name} has {count} values; one for each of the {records} records is needed"
-            ));
-        }
-        // The numbers of the array, both parts of them, and what is made of them.
-        machine::holds(name, 40.0 * records as f64)?;
-        // A row of numbers is one record.
-        let format = &RawFormat::default();
-        let numbers = Numbers { format, ..self };
-        let mut array = numbers.records(duplicate(file)?, array.clone())?;
-        let read = array.source.read(0..array.records, 0..array.samples)?;
-        Ok(Some(read.into_iter().map(|value| value.re).collect()))
-    }
+    // The numbers of the array, both parts of them, and what is made of them.
+    machine::holds(name, 40.0 * records as f64)?;
+    // A row of numbers is one record.
+    let format = RawFormat::default();
+    let mut array = records_of_array(
+        path,
+        &format,
+        pulses_per_line,
+        duplicate(file)?,
+        array.clone(),
+    )?;
+    let read = array.source.read(0..array.records, 0..array.samples)?;
+    Ok(Some(read.into_iter().map(|value| value.re).collect()))
 }

@@ -1,8 +1,8 @@
-//! Raw signals in NetCDF: `signals.nc`, or a variable of one's own with the samples of a record running fastest, read piece by piece.
+//! Raw signals in NetCDF: `signals.nc`, or a user-supplied variable with the samples of a record running fastest, read piece by piece.
 //!
 //! Check: signals of a run come back; constants of the recording that the scene contradicts are named.
 
-use super::{About, RawFormat, RawRecords, RecordSource};
+use super::{RawFormat, RawRecords, RecordSource};
 use crate::Error;
 use crate::io::netcdf_input::{NetcdfFile, open};
 use crate::io::number::middle_code;
@@ -69,7 +69,6 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
     };
     let shape = [lengths.iter().product::<u64>() as usize, samples as usize];
     let is_complex = are_pairs || second.is_some();
-    let about = about(file, shape[0])?;
     let source = NetcdfRecords {
         file: file.clone(),
         name: name.clone(),
@@ -77,12 +76,11 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
         are_pairs,
         lengths,
     };
-    Ok(RawRecords {
-        packed_scale: scale,
-        zero,
-        about,
-        ..RawRecords::new(path, source, shape, is_complex, bits > 0)
-    })
+    let mut records = RawRecords::new(path, source, shape, is_complex, bits > 0);
+    records.packed_scale = scale;
+    records.zero = zero;
+    read_metadata(file, &mut records)?;
+    Ok(records)
 }
 
 /// The variable of the second quadrature, if there is one.
@@ -188,26 +186,25 @@ fn blocks(lengths: &[u64], places: Range<u64>) -> Vec<Vec<Range<u64>>> {
     out
 }
 
-fn about(file: &NetcdfFile, records: usize) -> Result<About, String> {
-    let mut about = About {
-        scene_toml: file.global_text("scene").map(str::to_owned),
-        ..About::default()
-    };
+/// Reads what a file says of its records.
+fn read_metadata(file: &NetcdfFile, records: &mut RawRecords) -> Result<(), String> {
+    let count = records.records;
+    records.scene_toml = file.global_text("scene").map(str::to_owned);
     if let Some((_, elevation_rad)) = variable::elevations_rad(file)? {
-        about.elevation_rad = one_for_each(elevation_rad, records);
+        records.elevation_rad = one_for_each(elevation_rad, count);
     }
     if let Some(name) = first_variable(file, ["pulse_time", "ray_time"]) {
-        about.time_s = one_for_each(file.seconds(name)?, records);
+        records.time_s = one_for_each(file.seconds(name)?, count);
     }
     if let Some(name) = first_variable(file, ["ray_line", "line"]) {
-        about.line = one_for_each(file.floats(name)?, records);
+        records.line = one_for_each(file.floats(name)?, count);
     }
     for name in CONSTANTS.split(' ').filter(|name| file.has(name)) {
         if let Some(value) = file.floats(name)?.first() {
-            about.constants.insert(name, *value);
+            records.constants.insert(name, *value);
         }
     }
-    Ok(about)
+    Ok(())
 }
 
 /// Values of the records; none for a coordinate of the samples, such as time.
@@ -336,7 +333,7 @@ mod tests {
             (found.records, found.samples, found.is_complex),
             (6, 4, false)
         );
-        assert_eq!(found.about.line, Some(vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]));
+        assert_eq!(found.line, Some(vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]));
         let some = found.read_samples(1..3, 1..3).unwrap();
         assert_eq!(
             some,

@@ -1,6 +1,6 @@
 //! Arrays as numpy stores them: one in an NPY file, several in an NPZ archive that is not compressed.
 //!
-//! Only where an array is and how its numbers stand is read here. Check: files that numpy wrote; damaged ones.
+//! Only where an array is and how its numbers are stored is read here. Check: files that numpy wrote; damaged ones.
 
 use crate::io::number::{ByteOrder, NumberType};
 use rawzip::{CompressionMethod, RECOMMENDED_BUFFER_SIZE, ZipArchive};

@@ -21,7 +21,7 @@ const STATUS: &str = "radial_wind_speed_status";
 /// Nyquist velocities that differ by less than this fraction are one.
 const ONE_NYQUIST: f64 = 1e-3;
 
-/// The scans of a file or a group, and what was left out; `sweep` is the number of its first sweep.
+/// The scans of a file or a group, and what was skipped; `sweep` is the number of its first sweep.
 pub(super) fn scans(
     file: &NetcdfFile,
     path: &Path,
@@ -29,7 +29,7 @@ pub(super) fn scans(
     sweep: usize,
 ) -> Result<Found, String> {
     let range_m = ranges(file)?;
-    let velocity = Field::velocity(file, format)?;
+    let velocity = VelocityVariable::new(file, format)?;
     let rays = Rays::read(file, format, &velocity, range_m.len())?;
     let pulse_width_s = pulse_width(file)?;
     let place_deg = place(file)?;
@@ -104,7 +104,7 @@ impl Rays {
     fn read(
         file: &NetcdfFile,
         format: &ScanFormat,
-        velocity: &Field,
+        velocity: &VelocityVariable,
         gates: usize,
     ) -> Result<Self, String> {
         let (_, elevation_rad) =
@@ -120,7 +120,12 @@ impl Rays {
         };
         let times = times(file, count)?;
         let layout = GateLayout::new(file, &velocity.name, count, gates)?;
-        let cells = Cells::read(file, format, velocity, &layout)?;
+        let velocity_m_s = velocities_m_s(file, format, velocity, &layout)?;
+        let counts = match velocity.is_mean {
+            true => layout.optional(file, "count")?,
+            false => None,
+        };
+        let sigma_m_s = sigmas_m_s(file, &layout, counts.as_deref())?;
         // Mirrored velocities are no multiple away from those of the air.
         let is_mirrored = variable::find(file, &NYQUIST)
             .and_then(|name| file.text(name, "folding"))
@@ -130,11 +135,14 @@ impl Rays {
         let mut is_still = Vec::with_capacity(count);
         let mut fold_m_s = Vec::with_capacity(count);
         for ray in 0..count {
+            let cells = ray * gates..(ray + 1) * gates;
+            let sigma_m_s = sigma_m_s.as_ref().map(|all| all[cells.clone()].to_vec());
             rows.push(RayRow {
                 elevation_rad: elevation_rad[ray],
                 azimuth_rad: azimuth_rad[ray],
                 time_s: times.time_s[ray],
-                ..cells.row(ray * gates..(ray + 1) * gates)
+                velocity_m_s: velocity_m_s[cells].to_vec(),
+                sigma_m_s: sigma_m_s.unwrap_or_default(),
             });
             is_still.push(moving.as_ref().is_none_or(|moves| moves[ray] != 1.0));
             let nyquist_m_s = nyquist_m_s.as_ref().map_or(f64::NAN, |all| all[ray]);
@@ -146,7 +154,7 @@ impl Rays {
             fold_m_s,
             sweeps,
             reference: times.reference,
-            scans: mean_count(cells.realisations.iter().flatten().copied()),
+            scans: mean_count(counts.iter().flatten().copied()),
             warnings: times.not_understood.into_iter().collect(),
         })
     }
@@ -189,84 +197,61 @@ fn is_one_fold(fold_m_s: Option<f64>, other_m_s: Option<f64>) -> bool {
     }
 }
 
-/// What the gates of all rays hold, one ray after the other.
-struct Cells {
-    /// Positive away, NaN where noise or the instrument says that it is none.
-    velocity_m_s: Vec<f64>,
-    sigma_m_s: Option<Vec<f64>>,
-    /// Of how many each velocity is the mean.
-    realisations: Option<Vec<f64>>,
+/// Velocities of the gates of all rays, one ray after the other, m/s: positive away, NaN where they are noise or the instrument
+/// flags them.
+fn velocities_m_s(
+    file: &NetcdfFile,
+    format: &ScanFormat,
+    velocity: &VelocityVariable,
+    layout: &GateLayout,
+) -> Result<Vec<f64>, String> {
+    let mut velocity_m_s = layout.spread(
+        &velocity.name,
+        variable::values(file, &velocity.name, Quantity::Velocity)?,
+    )?;
+    // A fraction of realisations, or 0 and 1.
+    let flagged = layout.optional(file, "flagged")?;
+    // 1 where the instrument trusts its velocity.
+    let status = layout.optional(file, STATUS)?;
+    let ratio_db = match (format.min_snr_db, variable::find(file, &RATIO)) {
+        (None, _) => None,
+        (Some(_), Some(name)) => Some(layout.spread(name, variable::ratio_db(file, name)?)?),
+        (Some(_), None) => return Err(super::NO_RATIO.to_owned()),
+    };
+    for (at, value) in velocity_m_s.iter_mut().enumerate() {
+        let is_noise = ratio_db
+            .as_ref()
+            .is_some_and(|ratios_db| format.is_noise(ratios_db[at]))
+            || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
+            || status.as_ref().is_some_and(|status| status[at] != 1.0);
+        *value = if is_noise {
+            f64::NAN
+        } else {
+            velocity.sign * *value
+        };
+    }
+    Ok(velocity_m_s)
 }
 
-impl Cells {
-    fn read(
-        file: &NetcdfFile,
-        format: &ScanFormat,
-        velocity: &Field,
-        layout: &GateLayout,
-    ) -> Result<Self, String> {
-        let mut velocity_m_s = layout.spread(
-            &velocity.name,
-            variable::values(file, &velocity.name, Quantity::Velocity)?,
-        )?;
-        // A fraction of realisations, or 0 and 1.
-        let flagged = layout.optional(file, "flagged")?;
-        // 1 where the instrument trusts its velocity.
-        let status = layout.optional(file, STATUS)?;
-        let ratio_db = match (format.min_snr_db, variable::find(file, &RATIO)) {
-            (None, _) => None,
-            (Some(_), Some(name)) => Some(layout.spread(name, variable::ratio_db(file, name)?)?),
-            (Some(_), None) => return Err(super::NO_RATIO.to_owned()),
-        };
-        for (at, value) in velocity_m_s.iter_mut().enumerate() {
-            let is_noise = ratio_db
-                .as_ref()
-                .is_some_and(|ratios_db| format.is_noise(ratios_db[at]))
-                || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
-                || status.as_ref().is_some_and(|status| status[at] != 1.0);
-            *value = if is_noise {
-                f64::NAN
-            } else {
-                velocity.sign * *value
-            };
-        }
-        let sigma_m_s = match variable::find(file, &SIGMA) {
-            Some(name) => {
-                let values = variable::values(file, name, Quantity::Velocity)?;
-                Some(layout.spread(name, values)?)
-            }
-            None => None,
-        };
-        let realisations = match velocity.is_mean {
-            true => layout.optional(file, "count")?,
-            false => None,
-        };
-        Ok(Self {
-            velocity_m_s,
-            sigma_m_s,
-            realisations,
-        })
+/// Standard deviations of the velocities, m/s, if the file has them; of means over scans as many as it counts.
+fn sigmas_m_s(
+    file: &NetcdfFile,
+    layout: &GateLayout,
+    counts: Option<&[f64]>,
+) -> Result<Option<Vec<f64>>, String> {
+    let Some(name) = variable::find(file, &SIGMA) else {
+        return Ok(None);
+    };
+    let values = variable::values(file, name, Quantity::Velocity)?;
+    let mut sigma_m_s = layout.spread(name, values)?;
+    for (cell, sigma_m_s) in sigma_m_s.iter_mut().enumerate() {
+        *sigma_m_s = of_mean(*sigma_m_s, counts.map(|counts| counts[cell]));
     }
-
-    /// The velocities of a ray, and their standard deviations.
-    fn row(&self, cells: std::ops::Range<usize>) -> RayRow {
-        let mut sigma_m_s = Vec::new();
-        if let Some(all) = &self.sigma_m_s {
-            for cell in cells.clone() {
-                let count = self.realisations.as_ref().map(|count| count[cell]);
-                sigma_m_s.push(of_mean(all[cell], count));
-            }
-        }
-        RayRow {
-            sigma_m_s,
-            velocity_m_s: self.velocity_m_s[cells].to_vec(),
-            ..RayRow::default()
-        }
-    }
+    Ok(Some(sigma_m_s))
 }
 
 /// The variable that holds the velocities.
-struct Field {
+struct VelocityVariable {
     name: String,
     /// 1 for velocities that are positive away from the lidar.
     sign: f64,
@@ -274,8 +259,8 @@ struct Field {
     is_mean: bool,
 }
 
-impl Field {
-    fn velocity(file: &NetcdfFile, format: &ScanFormat) -> Result<Self, String> {
+impl VelocityVariable {
+    fn new(file: &NetcdfFile, format: &ScanFormat) -> Result<Self, String> {
         let name = match &format.field {
             Some(name) if file.has(name) => name.clone(),
             Some(name) => return Err(format!("it has no variable {name}, which --field names")),
@@ -295,7 +280,7 @@ impl Field {
     }
 }
 
-/// How the gates of the rays stand in a variable: \[time, range\], or one ray after the other, each with its own number of gates.
+/// How the gates of the rays are ordered in a variable: \[time, range\], or one ray after the other, each with its own number of gates.
 struct GateLayout {
     /// Where each ray begins, and its gates.
     rays: Vec<(usize, usize)>,
@@ -323,7 +308,7 @@ impl GateLayout {
                 if let Some((_, count)) = own.iter().find(|(_, count)| *count > gates) {
                     return Err(format!("a ray has {count} gates, range {gates} values"));
                 }
-                // Velocities, what stands beside them, and the lines of the map.
+                // Velocities, their standard deviations and ratios, and the lines of the map.
                 machine::holds(
                     &format!("{rays} rays x {gates} ranges"),
                     40.0 * rays as f64 * gates as f64,
@@ -472,7 +457,7 @@ fn pulse_width(file: &NetcdfFile) -> Result<Option<f64>, String> {
         .filter(|value| *value > 0.0 && value.is_finite()))
 }
 
-/// Latitude and longitude of an instrument that stands, degrees; nothing where they are missing or change from ray to ray.
+/// Latitude and longitude of an instrument that does not move, degrees; nothing where they are missing or change from ray to ray.
 fn place(file: &NetcdfFile) -> Result<Option<[f64; 2]>, String> {
     let [latitude, longitude] = ["latitude", "longitude"].map(|name| match file.has(name) {
         true => file.floats(name),

@@ -25,7 +25,7 @@ const FARTHEST_M: f64 = 1e6;
 const FEWEST_GATES: usize = 3;
 const FEWEST_VELOCITIES: usize = 30;
 
-/// Scans of which the scatter tells a deviation.
+/// Fewest scans whose scatter gives a standard deviation.
 const ENOUGH_SCANS: f64 = 20.0;
 
 /// Standard deviation of a velocity that is the mean of `count` scans, whose scatter gave the deviation of one; unknown of few.

@@ -1,7 +1,7 @@
 //! Scans from HALO Photonics raw files, in their dialects.
 //!
 //! The header says how gates lie, and not always truly: files of overlapping gates print the formula of gates that touch, so that
-//! the scan type decides. Noise has velocities over the whole band; what tells it is the intensity.
+//! the scan type decides. Noise has velocities over the whole band; it is recognised by its intensity.
 //! Check: a map written by this program comes back; each dialect; files that are cut short.
 
 use super::grid::{RayRow, scan_map};
@@ -13,7 +13,7 @@ use std::path::Path;
 
 /// Gates of which this program knows nothing better overlap by so much, m (samples at 50 MHz).
 const OVERLAP_STEP_M: f64 = 3.0;
-/// Intensities above 1 by so many standard deviations of those below 1 are no noise.
+/// Intensities above 1 by this many standard deviations of those below 1 are no noise.
 const SIGMAS_ABOVE_NOISE: f64 = 4.0;
 /// Most gates of a ray.
 const MOST_GATES: usize = 1_000_000;

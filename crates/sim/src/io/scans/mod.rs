@@ -40,7 +40,7 @@ impl ScanFormat {
         if self.towards { -1.0 } else { 1.0 }
     }
 
-    /// Whether a velocity with this signal-to-noise ratio, dB, is left out; that of an unknown one is.
+    /// Whether a velocity is skipped for its signal-to-noise ratio, dB: a low or an unknown one.
     fn is_noise(&self, snr_db: f64) -> bool {
         self.min_snr_db
             .is_some_and(|least| snr_db.is_nan() || snr_db < least)
@@ -56,7 +56,7 @@ pub struct ReadScan {
     pub sweep: usize,
     /// Azimuth of the vertical plane of the scan, rad, from 0 to 2 pi, for elevations below 90 degrees; none if it is unknown.
     pub azimuth_rad: Option<f64>,
-    /// Latitude and longitude of an instrument that stands, degrees, if the file has them.
+    /// Latitude and longitude of an instrument that does not move, degrees, if the file has them.
     pub place_deg: Option<[f64; 2]>,
     /// The velocities; times count from `reference`.
     pub map: ScanMap,
@@ -149,7 +149,7 @@ struct Found {
     warnings: Vec<String>,
 }
 
-/// Reads the scans of a file; the texts say which sweeps are none and left out, and which times were not understood.
+/// Reads the scans of a file; the texts name the sweeps that are skipped and the times that were not understood.
 ///
 /// # Errors
 /// A file that cannot be read, is damaged or cut short, has no scan in elevation, or no velocity that is not missing; a variable that
@@ -172,7 +172,7 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
     }
     let mut notes = Vec::new();
     for what in found.skipped {
-        notes.push(format!("{what}: left out"));
+        notes.push(format!("{what}: skipped"));
     }
     notes.extend(found.warnings);
     Ok((found.scans, notes))

@@ -251,7 +251,7 @@ fn is_impossible(ray: &RayRow) -> bool {
 /// Removes rays without a possible elevation, in words; elevations below the horizon may count on from 270 degrees.
 ///
 /// # Errors
-/// So many that the unit must be another one.
+/// Fails if so many are impossible that the unit must be another one.
 fn drop_impossible(rays: &mut Vec<RayRow>) -> Result<Option<String>, String> {
     let all = rays.len();
     for ray in rays.iter_mut() {

@@ -111,9 +111,9 @@ pub(super) fn scans(
     let per_line = plan.scene().scan.pulses_per_line;
     let (elevation_rad, time_s) = match table {
         Some(table) => interpolate(table, count, per_line)?,
-        None => match &records.about.elevation_rad {
-            Some(elevation_rad) => (elevation_rad.clone(), records.about.time_s.clone()),
-            None => (of_scene(plan, records)?, records.about.time_s.clone()),
+        None => match &records.elevation_rad {
+            Some(elevation_rad) => (elevation_rad.clone(), records.time_s.clone()),
+            None => (of_scene(plan, records)?, records.time_s.clone()),
         },
     };
     let prt_s = 1.0 / plan.scene().laser.pulse_repetition_hz;
@@ -141,7 +141,6 @@ pub(super) fn scans(
         )));
     }
     let marks = records
-        .about
         .line
         .as_ref()
         .filter(|_| table.is_none())

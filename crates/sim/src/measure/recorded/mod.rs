@@ -113,7 +113,7 @@ pub fn scene_of_records(
     };
     let whole = scan_lines::schedule(&scene)?.pulses();
     // The truth of a scene is not that of its signals with another sign of the velocities.
-    let of_run = records.about.scene_toml.as_deref();
+    let of_run = records.scene_toml.as_deref();
     let own = of_run
         .filter(|_| !records.is_reversed)
         .and_then(|toml| SceneFile::embedded(toml, &records.path).ok())
@@ -217,7 +217,7 @@ fn fits(scene: &Scene, records: &RawRecords) -> Result<(), Error> {
         ),
         ("pulse_sigma", "pulse", scene.pulse_sigma_s()),
     ] {
-        let Some(value) = records.about.constants.get(name) else {
+        let Some(value) = records.constants.get(name) else {
             continue;
         };
         let off = (value - own).abs();
