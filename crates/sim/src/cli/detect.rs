@@ -113,13 +113,8 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
         Some(scene) => scene.provenance(),
         None => Provenance::new("", "", settings.seed),
     };
-    let result = Detections {
-        scans,
-        found,
-        power,
-        notes,
-    };
-    result.report(args, cli, &settings, origin)
+    let result = (&scans[..], &found[..], power.as_ref());
+    report(args, cli, &settings, result, &notes, origin)
 }
 
 /// Tests scans for wakes; an error of a single one names its file.
@@ -136,59 +131,45 @@ fn test_scans(
 }
 
 /// Scans, the results of their tests, and how often wakes are detected in scans like them.
-struct Detections {
-    scans: Vec<ReadScan>,
-    found: Vec<ScanDetection>,
-    power: Option<Power>,
-    notes: Vec<String>,
-}
+type Tested<'t> = (&'t [ReadScan], &'t [ScanDetection], Option<&'t Power>);
 
-impl Detections {
-    /// Writes the files and prints the results.
-    fn report(
-        &self,
-        args: &DetectArgs,
-        cli: &Cli,
-        settings: &DetectionSettings,
-        origin: Provenance,
-    ) -> Result<(), Error> {
-        let mut found = self.found.iter();
-        let background = background(settings, found.all(|scan| scan.assumed_sigma_m_s.is_none()));
-        let mut lines = self.notes.clone();
-        self.add_lines(&mut lines);
-        lines.push(format!("the false-alarm rate holds for {background}\n"));
-        let mut scans = Vec::with_capacity(self.scans.len());
-        for (scan, found) in self.scans.iter().zip(&self.found) {
-            scans.push(scan_object(scan, found));
-        }
-        let power = self.power.as_ref();
-        let object = json!({
-            "false_alarm": args.false_alarm, "background": background, "scans": scans,
-            "smallest_detectable_m2_s": power.map(|power| power.smallest_m2_s.0),
-            "smallest_detectable_error_m2_s": power.map(|power| power.smallest_error_m2_s),
-            "smallest_foretold_m2_s": power.map(|power| power.smallest_m2_s.1),
-            "threshold": power.map(|power| power.threshold),
-            "circulation_std_m2_s": power.map(|power| power.circulation_std_m2_s),
-            "gumbel": power.map(|power| [power.gumbel.0, power.gumbel.1]),
-            "notes": self.notes,
-        });
-        args.folder.finish(
-            cli,
-            (Default::default(), origin),
-            |files| list(args, Some(self), files),
-            (object, lines.join("\n")),
-        )
+/// Writes the files and prints the results.
+fn report(
+    args: &DetectArgs,
+    cli: &Cli,
+    settings: &DetectionSettings,
+    result: Tested<'_>,
+    notes: &[String],
+    origin: Provenance,
+) -> Result<(), Error> {
+    let (scans, found, power) = result;
+    let is_known = found.iter().all(|scan| scan.assumed_sigma_m_s.is_none());
+    let background = background(settings, is_known);
+    let mut lines = notes.to_vec();
+    let mut objects = Vec::with_capacity(scans.len());
+    for (scan, found) in scans.iter().zip(found) {
+        add_scan(scan, found, &mut lines);
+        objects.push(scan_object(scan, found));
     }
-
-    /// Adds a description of the scans and of the wakes that are detected in scans like them.
-    fn add_lines(&self, lines: &mut Vec<String>) {
-        for (scan, found) in self.scans.iter().zip(&self.found) {
-            add_scan(scan, found, lines);
-        }
-        if let Some(power) = &self.power {
-            add_power(power, lines);
-        }
+    if let Some(power) = power {
+        add_power(power, &mut lines);
     }
+    lines.push(format!("the false-alarm rate holds for {background}\n"));
+    let object = json!({
+        "false_alarm": args.false_alarm, "background": background, "scans": objects,
+        "smallest_detectable_m2_s": power.map(|power| power.smallest_m2_s.0),
+        "smallest_detectable_error_m2_s": power.map(|power| power.smallest_error_m2_s),
+        "smallest_foretold_m2_s": power.map(|power| power.smallest_m2_s.1),
+        "threshold": power.map(|power| power.threshold),
+        "circulation_std_m2_s": power.map(|power| power.circulation_std_m2_s),
+        "gumbel": power.map(|power| [power.gumbel.0, power.gumbel.1]), "notes": notes,
+    });
+    args.folder.finish(
+        cli,
+        (Default::default(), origin),
+        |files| list(args, Some(result), files),
+        (object, lines.join("\n")),
+    )
 }
 
 impl DetectArgs {
@@ -274,13 +255,13 @@ fn add_power(power: &Power, lines: &mut Vec<String>) {
 }
 
 /// The files; before the tests their names alone.
-fn list(args: &DetectArgs, result: Option<&Detections>, files: &mut Outputs) -> Result<(), Error> {
+fn list(args: &DetectArgs, result: Option<Tested<'_>>, files: &mut Outputs) -> Result<(), Error> {
     if !args.data.is_empty() {
-        files.table("detection", result, |result| {
-            Ok(scan_table(&result.scans, &result.found))
+        files.table("detection", result.as_ref(), |(scans, found, _)| {
+            Ok(scan_table(scans, found))
         })?;
     }
-    let power = result.and_then(|result| result.power.as_ref());
+    let power = result.and_then(|(_, _, power)| power);
     files.table("detection_power", power, |power| {
         Ok(share_table(power, &power.found, true))
     })?;

@@ -11,7 +11,7 @@ use super::wake::{self, Due};
 use crate::Error;
 use crate::io::cf_planes::cf_planes_bytes;
 use crate::io::{
-    CrossPlanes, Existing, FileGroup, FileParts, Provenance, Share, VelocityField, cf_fields,
+    CrossPlanes, Existing, FileGroup, FileParts, Provenance, VelocityField, cf_fields,
 };
 use ndarray::Array3;
 use std::path::{Path, PathBuf};
@@ -187,19 +187,15 @@ impl Files {
 
     /// The files that are due of the flow, which all ranks must make together: of fields what this rank has, planes whole.
     fn group(&self, flow: &Flow, due: Due, is_first: bool) -> Result<FileGroup, Error> {
-        let share = Share {
-            planes: flow.own_planes(),
-            is_first,
-        };
         let mut group = FileGroup::new(&self.folder);
         for file in self.of_output(due) {
             let parts = match (file.plane, file.format) {
                 (None, FileFormat::Netcdf) => {
-                    let field = self.field(flow, share.clone())?;
+                    let field = self.field(flow)?;
                     cf_fields::cf_field_parts(&field, &self.origin)?
                 }
                 (None, FileFormat::InitialNetcdf) => {
-                    let faces = self.faces(flow, share.clone())?;
+                    let faces = self.faces(flow)?;
                     cf_fields::cf_faces_parts(&faces, &self.origin)?
                 }
                 (Some(plane), FileFormat::Netcdf) => {
@@ -214,7 +210,7 @@ impl Files {
         Ok(group)
     }
 
-    fn field(&self, flow: &Flow, share: Share) -> Result<VelocityField, Error> {
+    fn field(&self, flow: &Flow) -> Result<VelocityField, Error> {
         let mesh = flow.mesh();
         let vorticity_per_s = if self.is_wake {
             Some(flow.own_vorticity_magnitude_per_s().map_err(Error::Flow)?)
@@ -237,11 +233,11 @@ impl Files {
             velocity_m_s: [u_m_s, v_m_s, w_m_s],
             pressure_m2_s2: flow.own_pressure_m2_s2().map_err(Error::Flow)?,
             vorticity_per_s,
-            share,
+            planes: flow.own_planes(),
         })
     }
 
-    fn faces(&self, flow: &Flow, share: Share) -> Result<cf_fields::FaceVelocities, Error> {
+    fn faces(&self, flow: &Flow) -> Result<cf_fields::FaceVelocities, Error> {
         let mesh = flow.mesh();
         let u_m_s = flow.own_face_velocity_m_s(0).map_err(Error::Flow)?;
         let v_m_s = flow.own_face_velocity_m_s(1).map_err(Error::Flow)?;
@@ -256,7 +252,7 @@ impl Files {
                 faces_m
             }),
             velocity_m_s: [u_m_s, v_m_s, w_m_s],
-            share,
+            planes: flow.own_planes(),
         })
     }
 

@@ -2,8 +2,8 @@
 //! square, as a flow that starts from a file.
 
 use super::CaseFile;
+use crate::io::Provenance;
 use crate::io::cf_fields::{FaceVelocities, cf_faces_parts};
-use crate::io::{Provenance, Share};
 use tempfile::TempDir;
 use wakescope_les::cases::taylor_green_plane_exact;
 
@@ -36,7 +36,7 @@ pub(crate) fn folder() -> TempDir {
         ],
         centre_m: [vec![0.5], centre_m.clone(), centre_m],
         face_m: [vec![0.0], face_m.clone(), face_m],
-        share: Share::whole(NODES),
+        planes: 0..NODES,
     };
     let origin = Provenance::new("", "", 0);
     let bytes = cf_faces_parts(&field, &origin).unwrap().into_bytes();

@@ -6,8 +6,9 @@ use super::edges;
 use super::error::{OutputResult, same_length};
 use super::fields::VelocityField;
 use super::netcdf::{Data, Layout, Variable, described};
-use super::parts::{FileParts, Share};
+use super::parts::FileParts;
 use super::provenance::Provenance;
+use std::ops::Range;
 use wakescope_les::winds::Edges;
 
 /// The field at the centres as a file, or what one of several ranks has of it.
@@ -48,7 +49,7 @@ pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputR
         field.first(),
     );
     Layout::cf(&field.title, dims, variables, provenance)
-        .into_parts(provenance, field.share.is_first)
+        .into_parts(provenance, field.planes.start == 0)
 }
 
 /// Velocity components at the low faces of the cells.
@@ -64,8 +65,8 @@ pub struct FaceVelocities {
     pub face_m: [Vec<f64>; 3],
     /// Velocities u, v, w, each `[z][y][x]`, m/s.
     pub velocity_m_s: [Vec<f64>; 3],
-    /// The planes across z whose values these are.
-    pub share: Share,
+    /// The planes across z whose values these are; the rank that has the first one writes what belongs to no plane, too.
+    pub planes: Range<usize>,
 }
 
 /// The components on their own faces as a file, or what one of several ranks has of it.
@@ -91,16 +92,16 @@ pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> Output
             name,
             velocity_m_s.len(),
             "z x y x x",
-            faces.share.planes.len() * plane,
+            faces.planes.len() * plane,
         )?;
         values.push((name, Data::f64(velocity_m_s.iter().copied())));
     }
     let variables = shared(
         described(include_str!("cf_faces.cdl"), values),
-        faces.share.planes.start * plane,
+        faces.planes.start * plane,
     );
     Layout::cf(&faces.title, dims, variables, provenance)
-        .into_parts(provenance, faces.share.is_first)
+        .into_parts(provenance, faces.planes.start == 0)
 }
 
 /// The variables of which ranks have the values from number `first` on: those over the planes across z.
@@ -184,7 +185,7 @@ mod tests {
             centre_m,
             face_m,
             velocity_m_s,
-            share: Share::whole(4),
+            planes: 0..4,
         };
         let (_temp, mut file) = open(cf_faces_parts(&faces, &example()).unwrap());
         assert_eq!(

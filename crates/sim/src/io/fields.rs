@@ -2,7 +2,7 @@
 //! Check: wrong lengths and values are refused; the formats' tests read fields back.
 
 use super::error::{OutputError, OutputResult, increasing, same_length};
-use super::parts::Share;
+use std::ops::Range;
 
 /// Velocity and pressure at the centres of the cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,8 +25,8 @@ pub struct VelocityField {
     pub pressure_m2_s2: Vec<f64>,
     /// Magnitude of the vorticity, `[z][y][x]`, 1/s; where it is wanted.
     pub vorticity_per_s: Option<Vec<f64>>,
-    /// The planes across z whose values these are.
-    pub share: Share,
+    /// The planes across z whose values these are; the rank that has the first one writes what belongs to no plane, too.
+    pub planes: Range<usize>,
 }
 
 impl VelocityField {
@@ -38,7 +38,7 @@ impl VelocityField {
         increasing("x_m", &self.x_m)?;
         increasing("y_m", &self.y_m)?;
         increasing("z_m", &self.z_m)?;
-        let cells = self.x_m.len() * self.y_m.len() * self.share.planes.len();
+        let cells = self.x_m.len() * self.y_m.len() * self.planes.len();
         for (name, values) in self.named() {
             same_length(name, values.len(), "z_m x y_m x x_m", cells)?;
             if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
@@ -50,7 +50,7 @@ impl VelocityField {
 
     /// The first of the values that are here, in the order of the whole field.
     pub(crate) fn first(&self) -> usize {
-        self.share.planes.start * self.x_m.len() * self.y_m.len()
+        self.planes.start * self.x_m.len() * self.y_m.len()
     }
 
     /// The fields with their names.
@@ -86,7 +86,7 @@ pub(crate) fn example() -> VelocityField {
         velocity_m_s: [field(0.25), field(100.5), field(-300.0)],
         pressure_m2_s2: field(0.125),
         vorticity_per_s: Some(field(7.5)),
-        share: Share::whole(4),
+        planes: 0..4,
     }
 }
 
@@ -94,17 +94,13 @@ pub(crate) fn example() -> VelocityField {
 #[cfg(test)]
 pub(crate) fn example_on_ranks() -> Vec<VelocityField> {
     let whole = example();
-    let mut is_first = true;
-    let rank = |planes: std::ops::Range<usize>| {
+    let rank = |planes: Range<usize>| {
         let part = |values: &Vec<f64>| values[6 * planes.start..6 * planes.end].to_vec();
         VelocityField {
             velocity_m_s: whole.velocity_m_s.each_ref().map(part),
             pressure_m2_s2: part(&whole.pressure_m2_s2),
             vorticity_per_s: whole.vorticity_per_s.as_ref().map(part),
-            share: Share {
-                planes,
-                is_first: std::mem::take(&mut is_first),
-            },
+            planes,
             ..whole.clone()
         }
     };

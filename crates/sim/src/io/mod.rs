@@ -69,7 +69,7 @@ pub(crate) use error::{increasing, same_length};
 pub use existing::Existing;
 pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
-pub use parts::{FileParts, Share};
+pub use parts::FileParts;
 pub use provenance::{Provenance, hash_of};
 pub use site::Site;
 pub(crate) use utc::MAX_TIME_S;

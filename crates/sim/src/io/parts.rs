@@ -1,8 +1,6 @@
 //! A file in parts that lie at known places, so that several ranks can write it: each the parts that it has.
 //! Check: the formats' tests put the parts of several ranks together and compare the bytes with those of one.
 
-use std::ops::Range;
-
 /// What one rank has of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FileParts {
@@ -28,25 +26,6 @@ impl From<Vec<u8>> for FileParts {
         Self {
             length: bytes.len() as u64,
             parts: vec![(0, bytes)],
-        }
-    }
-}
-
-/// What one of several ranks has of a field over planes across z.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Share {
-    /// The planes whose values it has.
-    pub planes: Range<usize>,
-    /// Whether it writes what belongs to no plane, too.
-    pub is_first: bool,
-}
-
-impl Share {
-    /// All of `planes` planes.
-    pub fn whole(planes: usize) -> Self {
-        Self {
-            planes: 0..planes,
-            is_first: true,
         }
     }
 }

@@ -5,7 +5,6 @@ use netcdf3::{DataSet, FileWriter, Version};
 use std::f64::consts::TAU;
 use std::path::Path;
 use wakescope_sim::io::Provenance;
-use wakescope_sim::io::Share;
 use wakescope_sim::io::cf_fields::{FaceVelocities, cf_faces_parts};
 use wakescope_sim::plan::Target;
 
@@ -63,14 +62,14 @@ fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
         scene_hash: "0".into(),
         seed: 1,
     };
-    let share = Share::whole(centre_m[2].len());
+    let planes = 0..centre_m[2].len();
     let faces = FaceVelocities {
         title: "wave".into(),
         time_s: 2.0,
         centre_m,
         face_m,
         velocity_m_s,
-        share,
+        planes,
     };
     std::fs::write(
         folder.path().join("wave.nc"),
