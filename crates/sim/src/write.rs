@@ -285,6 +285,10 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
     }
     let detector = &scene.detector;
     let first_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
+    let mut first_pulse = Vec::with_capacity(g.schedule.lines.len());
+    for line in &g.schedule.lines {
+        first_pulse.push(line.first);
+    }
     let mut time_s = Vec::with_capacity(g.samples);
     for sample in 0..g.samples {
         time_s.push(first_s + sample as f64 / detector.sampling_hz);
@@ -308,7 +312,7 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
         elevation_rad,
         azimuth_rad,
         time_s,
-        first_pulse: g.schedule.lines.iter().map(|line| line.first).collect(),
+        first_pulse,
     })
 }
 

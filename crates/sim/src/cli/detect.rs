@@ -155,15 +155,19 @@ fn report(
         add_power(power, &mut lines);
     }
     lines.push(format!("the false-alarm rate holds for {background}\n"));
-    let object = json!({
+    let mut object = json!({
         "false_alarm": args.false_alarm, "background": background, "scans": objects,
-        "smallest_detectable_m2_s": power.map(|power| power.smallest_m2_s.0),
-        "smallest_detectable_error_m2_s": power.map(|power| power.smallest_error_m2_s),
-        "smallest_foretold_m2_s": power.map(|power| power.smallest_m2_s.1),
-        "threshold": power.map(|power| power.threshold),
-        "circulation_std_m2_s": power.map(|power| power.circulation_std_m2_s),
-        "gumbel": power.map(|power| [power.gumbel.0, power.gumbel.1]), "notes": notes,
+        "smallest_detectable_m2_s": null, "smallest_detectable_error_m2_s": null, "smallest_foretold_m2_s": null,
+        "threshold": null, "circulation_std_m2_s": null, "gumbel": null, "notes": notes,
     });
+    if let Some(power) = power {
+        object["smallest_detectable_m2_s"] = json!(power.smallest_m2_s.0);
+        object["smallest_detectable_error_m2_s"] = json!(power.smallest_error_m2_s);
+        object["smallest_foretold_m2_s"] = json!(power.smallest_m2_s.1);
+        object["threshold"] = json!(power.threshold);
+        object["circulation_std_m2_s"] = json!(power.circulation_std_m2_s);
+        object["gumbel"] = json!([power.gumbel.0, power.gumbel.1]);
+    }
     args.folder.finish(
         cli,
         (Default::default(), origin),

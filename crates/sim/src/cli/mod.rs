@@ -84,23 +84,7 @@ enum Command {
         preset: Option<String>,
     },
     /// Check a scene; print its plan, run time and memory.
-    Check {
-        /// Scene file.
-        scene: PathBuf,
-        /// Output folder of the run, to be checked too.
-        #[arg(long, value_name = "DIR")]
-        out: Option<PathBuf>,
-        /// Accept a memory forecast that exceeds the machine's.
-        #[arg(long)]
-        allow_large: bool,
-        /// Draw the set-up to this SVG or PNG file.
-        #[cfg(feature = "plots")]
-        #[arg(long, value_name = "FILE")]
-        picture: Option<PathBuf>,
-        /// Replace the picture; accept existing files in the folder.
-        #[arg(long)]
-        overwrite: bool,
-    },
+    Check(CheckArgs),
     /// Simulate the whole measurement and write all requested files.
     Run(Io),
     /// Compute heterodyne efficiency and signal-to-noise ratio against range.
@@ -209,6 +193,26 @@ struct Io {
     allow_large: bool,
 }
 
+/// Arguments of `wakescope check`.
+#[derive(Debug, Args)]
+struct CheckArgs {
+    /// Scene file.
+    scene: PathBuf,
+    /// Output folder of the run, to be checked too.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Accept a memory forecast that exceeds the machine's.
+    #[arg(long)]
+    allow_large: bool,
+    /// Draw the set-up to this SVG or PNG file.
+    #[cfg(feature = "plots")]
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Replace the picture; accept existing files in the folder.
+    #[arg(long)]
+    overwrite: bool,
+}
+
 /// Runs the program with the arguments of its command line, the first being its name; returns its exit code.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let args: Vec<OsString> = args.into_iter().collect();
@@ -239,20 +243,7 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
             force,
             preset,
         } => init(scene, *force, preset.as_deref(), cli),
-        Command::Check {
-            scene,
-            out,
-            allow_large,
-            #[cfg(feature = "plots")]
-            picture,
-            overwrite,
-        } => {
-            #[cfg(not(feature = "plots"))]
-            let picture: &Option<PathBuf> = &None;
-            let existing = Existing::with_overwrite(*overwrite);
-            let picture = picture.as_deref();
-            check(scene, *allow_large, out.as_deref(), picture, existing, cli)
-        }
+        Command::Check(args) => check(args, cli),
         Command::Run(io) => execute(io, Target::Run, cli),
         Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
         Command::Signal(io) => execute(io, Target::Signal, cli),
@@ -328,24 +319,22 @@ fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(),
 /// What the ratio of a check lacks where phase screens make the efficiency.
 const AS_ON_INDEPENDENT_PATHS: &str = "; turbulence as on independent paths: one path out and back returns more, by as much as wakescope budget says";
 
-fn check(
-    scene: &Path,
-    allow_large: bool,
-    out: Option<&Path>,
-    picture: Option<&Path>,
-    existing: Existing,
-    cli: &Cli,
-) -> Result<(), Error> {
-    if out.is_none() && picture.is_none() {
-        cli.refuse_idle(scene, options::WITHOUT_OUTPUT)?;
+fn check(args: &CheckArgs, cli: &Cli) -> Result<(), Error> {
+    #[cfg(feature = "plots")]
+    let writes = args.out.is_some() || args.picture.is_some();
+    #[cfg(not(feature = "plots"))]
+    let writes = args.out.is_some();
+    if !writes {
+        cli.refuse_idle(&args.scene, options::WITHOUT_OUTPUT)?;
     }
-    let plan = planned(scene, Target::Run, allow_large, cli)?;
-    if let Some(folder) = out {
+    let plan = planned(&args.scene, Target::Run, args.allow_large, cli)?;
+    let existing = Existing::with_overwrite(args.overwrite);
+    if let Some(folder) = &args.out {
         // What is in the way of a run is in the way of it here, too.
         cli.prepare(folder, &write::names(&plan)?, existing)?;
     }
     #[cfg(feature = "plots")]
-    if let Some(path) = picture {
+    if let Some(path) = &args.picture {
         write::write_set_up(&plan, path, existing)?;
     }
     if cli.quiet && !cli.json {
@@ -372,7 +361,7 @@ fn check(
     let short = format!("SNR in the band, one pulse, at {ranges} m: {ratios} dB{screens}");
     cli.say(
         &object,
-        &format!("{}: good\n{plan}  {short}\n", scene.display()),
+        &format!("{}: good\n{plan}  {short}\n", args.scene.display()),
     )
 }
 

@@ -166,11 +166,11 @@ impl<'p> Collected<'p> {
         let scans = map.scans.len();
         let flagged = map.flagged.sum() * scans as f64;
         let few_outliers = flagged > 0.5 && flagged < LEAST_FLAGGED;
-        let has_few_estimates = |part: Part| {
-            let estimates = self.cells(part).len() * scans;
-            (1..LEAST_ESTIMATES).contains(&estimates)
-        };
-        few_outliers || [ALL, INSIDE, OUTSIDE].into_iter().any(has_few_estimates)
+        few_outliers
+            || [ALL, INSIDE, OUTSIDE].into_iter().any(|part| {
+                let estimates = self.cells(part).len() * scans;
+                (1..LEAST_ESTIMATES).contains(&estimates)
+            })
     }
 
     fn row(&self, map: &VelocityEstimates, scanner: &Scanner<'_>) -> Result<Vec<f64>, Error> {
@@ -198,18 +198,14 @@ impl<'p> Collected<'p> {
         }
         out.extend(flagged_fraction(map));
         out.push(f64::from(u8::from(self.has_rough_errors(map))));
-        let truths_m_s = self.apart.iter().map(|cell| map.v_gate_m_s[*cell]).cycle();
-        let known = self
-            .velocity_m_s
-            .iter()
-            .zip(truths_m_s)
-            .filter(|(_, truth)| truth.is_finite());
-        out.extend(bad_fraction(
-            plan,
-            &known
-                .map(|(velocity, truth)| velocity - truth)
-                .collect::<Vec<_>>(),
-        )?);
+        let mut errors_m_s = Vec::with_capacity(self.velocity_m_s.len());
+        for (velocity_m_s, cell) in self.velocity_m_s.iter().zip(self.apart.iter().cycle()) {
+            let truth_m_s = map.v_gate_m_s[*cell];
+            if truth_m_s.is_finite() {
+                errors_m_s.push(velocity_m_s - truth_m_s);
+            }
+        }
+        out.extend(bad_fraction(plan, &errors_m_s)?);
         out.extend(
             self.retrieval
                 .as_ref()

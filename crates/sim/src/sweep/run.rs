@@ -120,8 +120,7 @@ pub fn run(
         names.extend(case_files(case.index));
     }
     if settings.shard.is_none() {
-        let list = |files: &mut outputs::Outputs| tables::list(&definition, None, files);
-        names.extend(outputs::Outputs::names(Outputs::default(), list)?);
+        names.extend(tables::names(&definition)?);
     }
     // Shards may begin at the same time, in one folder: each writes files of its own.
     outputs::prepare(out, &names, existing, false)

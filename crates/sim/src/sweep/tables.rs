@@ -73,6 +73,11 @@ pub fn merge(
     write(&definition, &rows, out, existing)
 }
 
+/// Names of the files of all rows.
+pub(super) fn names(definition: &Definition) -> Result<Vec<String>, Error> {
+    Outputs::names(Formats::default(), |files| list(definition, None, files))
+}
+
 /// Writes the tables of all rows.
 pub(super) fn write(
     definition: &Definition,

@@ -67,7 +67,7 @@ fn snr_band_db(profile: &RangeProfile) -> Vec<(f64, f64)> {
 
 /// Points of a curve.
 fn points(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
-    x.iter().copied().zip(y.iter().copied()).collect()
+    x.iter().zip(y).map(|(x, y)| (*x, *y)).collect()
 }
 
 /// An efficiency against range, with its standard error as a band if it has one.
@@ -107,25 +107,21 @@ pub(super) fn map(
     if let Some(winds) = winds {
         return Ok(azimuth_display(plan, map, winds));
     }
-    let realisations = plan.scene().scan.realisations;
-    let mean = format!("mean of {realisations} realisations");
-    let titles = match realisations {
-        1 => vec![
-            ("v_exact", "exact field"),
-            ("v_scan", "one scan, estimated"),
-            ("bias", "its error"),
-        ],
-        _ => vec![
-            ("v_exact", "exact field"),
-            ("v_scan", "one scan, estimated"),
-            ("radial_velocity", &mean),
-            ("bias", "mean error (bias)"),
-            (
-                "velocity_standard_deviation",
-                "standard deviation of one scan",
-            ),
-            ("rms", "root mean square error"),
-        ],
+    let mean = format!("mean of {} realisations", plan.scene().scan.realisations);
+    let titles = [
+        ("v_exact", "exact field"),
+        ("v_scan", "one scan, estimated"),
+        ("radial_velocity", &mean),
+        ("bias", "mean error (bias)"),
+        (
+            "velocity_standard_deviation",
+            "standard deviation of one scan",
+        ),
+        ("rms", "root mean square error"),
+    ];
+    let titles = match plan.scene().scan.realisations {
+        1 => &[titles[0], titles[1], ("bias", "its error")],
+        _ => &titles[..],
     };
     let mut panels: Vec<MapPlot> = Vec::with_capacity(titles.len());
     for (field, title) in titles {
@@ -137,7 +133,7 @@ pub(super) fn map(
         }
         // Estimates have the colours of the exact field.
         if let Some(exact) = panels.first()
-            && ["v_scan", "radial_velocity"].contains(&field)
+            && ["v_scan", "radial_velocity"].contains(field)
         {
             plot = plot.coloured(exact.colours);
         }
