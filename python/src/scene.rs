@@ -31,7 +31,7 @@ pub(crate) fn scene<'py>(
             let allowed = format!("one of {}", known.join(", "));
             raised(
                 py,
-                &Refusal::of(Problem::new("preset", name, allowed)),
+                &Refusal::from_problem(Problem::new("preset", name, allowed)),
             )
         })?,
     };

@@ -34,14 +34,14 @@ const SAME_SHAPE: f64 = 0.8;
 const ROUNDING: f64 = 1e-9;
 
 /// A run with other cells or steps.
-struct Trial {
+struct FlowTrial {
     /// Length of its cells or steps over that of the case.
     spacing: f64,
     history: Result<History, Error>,
     run_s: f64,
 }
 
-impl Trial {
+impl FlowTrial {
     /// Runs a case; only the given one has to be possible.
     ///
     /// # Errors
@@ -92,7 +92,7 @@ impl Report {
         observer.begin(Stage::Cases, (MESHES.len() + STEPS.len()) as u64);
         let mut on_meshes = Vec::new();
         for (spacing, mesh) in &meshes {
-            on_meshes.push(Trial::run(mesh, *spacing, observer)?);
+            on_meshes.push(FlowTrial::run(mesh, *spacing, observer)?);
         }
         let given = &on_meshes[0];
         let mut available = METRICS.to_vec();
@@ -113,8 +113,8 @@ impl Report {
         let [shorter, longer] = STEPS;
         let (shorter_file, _, shorter_step) = file.with_longer_steps(shorter)?;
         let (longer_file, _, longer_step) = file.with_longer_steps(longer)?;
-        let short = Trial::run(&shorter_file, shorter, observer)?;
-        let long = Trial::run(&longer_file, longer, observer)?;
+        let short = FlowTrial::run(&shorter_file, shorter, observer)?;
+        let long = FlowTrial::run(&longer_file, longer, observer)?;
         observer.end();
         let mut rows = Vec::with_capacity(meshes.len());
         for ((_, mesh), trial) in meshes.iter().zip(&on_meshes) {
@@ -138,8 +138,8 @@ impl Report {
 
     /// Adds a setting from the rows of its values and their runs, the finest first, and a note on
     /// the order of its errors.
-    fn add(&mut self, key: &'static str, given: f64, entries: Vec<(Row, &Trial)>) {
-        let (mut rows, trials): (Vec<Row>, Vec<&Trial>) = entries.into_iter().unzip();
+    fn add(&mut self, key: &'static str, given: f64, entries: Vec<(Row, &FlowTrial)>) {
+        let (mut rows, trials): (Vec<Row>, Vec<&FlowTrial>) = entries.into_iter().unzip();
         let mut spacings = Vec::new();
         for trial in &trials {
             if trial.history.is_ok() {

@@ -125,7 +125,7 @@ fn middle_stretch(plan: &Plan) -> Option<[f64; 2]> {
 
 /// A run of a scene.
 #[derive(Debug, Clone, Default)]
-struct Trial {
+struct SceneTrial {
     sample: Sample,
     /// Exact relative shift of the bistatic efficiency by the phase screens, in the middle of the scan and the largest over its stretch.
     layer_shift: [f64; 2],
@@ -143,7 +143,7 @@ struct Study<'a> {
     observer: &'a dyn Observer,
     common: Common,
     /// The run with the given values.
-    given: Trial,
+    given: SceneTrial,
     /// Shift of metrics of the map for a relative shift of the efficiency of their signals.
     response: Vec<(Metric, Measured)>,
 }
@@ -164,7 +164,7 @@ impl<'a> Study<'a> {
             base,
             observer,
             common,
-            given: Trial::default(),
+            given: SceneTrial::default(),
             response: Vec::new(),
         };
         study.given = study.run(&study.base)?;
@@ -183,7 +183,7 @@ impl<'a> Study<'a> {
     }
 
     /// Runs a scene up to its map.
-    fn run(&self, file: &SceneFile) -> Result<Trial, Error> {
+    fn run(&self, file: &SceneFile) -> Result<SceneTrial, Error> {
         let plan = self.common.plan(file, Target::Run)?;
         plan.fits()?;
         let begun = Instant::now();
@@ -203,7 +203,7 @@ impl<'a> Study<'a> {
             None => Sample::default(),
         };
         sample.efficiency = efficiency;
-        Ok(Trial {
+        Ok(SceneTrial {
             sample,
             layer_shift: layer_shift(&plan),
             optics_s,
@@ -258,7 +258,7 @@ impl<'a> Study<'a> {
     fn setting(&self, key: &'static str, values: &[f64]) -> Setting {
         let given = value(&self.file.content, key);
         let of_base = value(&self.base.content, key);
-        let mut finest: Option<Trial> = None;
+        let mut finest: Option<SceneTrial> = None;
         let mut rows = Vec::new();
         for &value in values {
             let trial = if value == of_base {
@@ -301,8 +301,8 @@ impl<'a> Study<'a> {
         &self,
         key: &str,
         ratio: f64,
-        trial: &Trial,
-        finest: &Trial,
+        trial: &SceneTrial,
+        finest: &SceneTrial,
     ) -> Vec<(Metric, Measured)> {
         let mut shifts = Vec::new();
         match key {

@@ -55,7 +55,7 @@ pub struct Refusal(pub Value);
 
 impl Refusal {
     /// For a value that is not allowed.
-    pub fn of(problem: Problem) -> Self {
+    pub fn from_problem(problem: Problem) -> Self {
         Self(as_object(
             &SceneError::Invalid {
                 path: "scene".into(),

@@ -133,7 +133,7 @@ pub(crate) struct Drawing {
 
 /// Part of a text with one position.
 #[derive(Debug, PartialEq)]
-pub(crate) struct Run<'a> {
+pub(crate) struct TextRun<'a> {
     pub(crate) text: &'a str,
     /// Size of its letters, in sizes of the text.
     pub(crate) scale: f64,
@@ -141,7 +141,7 @@ pub(crate) struct Run<'a> {
     pub(crate) rise: f64,
 }
 
-impl<'a> Run<'a> {
+impl<'a> TextRun<'a> {
     fn plain(text: &'a str) -> Self {
         Self {
             text,
@@ -152,7 +152,7 @@ impl<'a> Run<'a> {
 }
 
 /// Splits a text at `^{...}` and `_{...}`; a brace that is never closed is plain text.
-pub(crate) fn runs(text: &str) -> Vec<Run<'_>> {
+pub(crate) fn runs(text: &str) -> Vec<TextRun<'_>> {
     let mut out = Vec::new();
     let mut rest = text;
     while let Some((start, end)) = marked(rest) {
@@ -161,15 +161,15 @@ pub(crate) fn runs(text: &str) -> Vec<Run<'_>> {
         } else {
             -0.18
         };
-        out.push(Run::plain(&rest[..start]));
-        out.push(Run {
+        out.push(TextRun::plain(&rest[..start]));
+        out.push(TextRun {
             text: &rest[start + 2..end],
             scale: 0.72,
             rise,
         });
         rest = &rest[end + 1..];
     }
-    out.push(Run::plain(rest));
+    out.push(TextRun::plain(rest));
     out.retain(|run| !run.text.is_empty());
     out
 }
@@ -203,7 +203,7 @@ mod tests {
         );
         assert_eq!(
             runs("a^{b"),
-            [Run {
+            [TextRun {
                 text: "a^{b",
                 scale: 1.0,
                 rise: 0.0

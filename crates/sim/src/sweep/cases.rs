@@ -44,19 +44,19 @@ pub struct Request {
 
 /// A key that varies.
 #[derive(Debug, Clone, PartialEq)]
-struct Column {
-    shown: VaryingKey,
+struct VaryingColumn {
+    varying: VaryingKey,
     key: SceneKey,
 }
 
-impl Column {
+impl VaryingColumn {
     /// The key that a word names; `value` is what it is to be.
     fn named(word: &str, value: &str, tied: bool) -> Result<Self, Problem> {
         let key = resolve(word.trim(), value.trim())?;
         Ok(Self {
-            shown: VaryingKey {
+            varying: VaryingKey {
                 name: word.trim().into(),
-                holds: Holds::of(&key.kind),
+                holds: Holds::from_kind(&key.kind),
                 tied,
             },
             key,
@@ -103,11 +103,14 @@ impl Sweep {
         let cases = grid
             .cases()
             .map_err(|error| scene_error(text, path, error))?;
-        let mut keys: Vec<VaryingKey> = grid.columns().map(|column| column.shown.clone()).collect();
+        let mut keys: Vec<VaryingKey> = grid
+            .columns()
+            .map(|column| column.varying.clone())
+            .collect();
         if request.independent
-            && let Ok(seed) = Column::named("seed", "", true)
+            && let Ok(seed) = VaryingColumn::named("seed", "", true)
         {
-            keys.push(seed.shown);
+            keys.push(seed.varying);
         }
         let origin = grid.origin(&keys, &cases);
         Ok(Self {
@@ -174,11 +177,11 @@ fn refused(word: &str, problem: Problem) -> Error {
 }
 
 /// Keys that vary together, and their values, a row for each combination.
-type Axis = (Vec<Column>, Vec<Vec<Value>>);
+type Axis = (Vec<VaryingColumn>, Vec<Vec<Value>>);
 /// Refuses keys that vary twice.
 fn check_columns(
-    columns: &[Column],
-    lets: &[(Column, &str)],
+    columns: &[VaryingColumn],
+    lets: &[(VaryingColumn, &str)],
     is_independent: bool,
 ) -> Result<(), Error> {
     let mut paths = Vec::new();
@@ -186,7 +189,10 @@ fn check_columns(
     for column in columns.iter().chain(lets.iter().map(|(own, _)| own)) {
         if paths.contains(&&column.key.path) {
             let why = "each key varies once, by --vary, --cases or --let";
-            return Err(refused("sweep", Problem::new(&column.shown.name, "", why)));
+            return Err(refused(
+                "sweep",
+                Problem::new(&column.varying.name, "", why),
+            ));
         }
         paths.push(&column.key.path);
         has_seed |= column.key.path == "seed";
@@ -204,10 +210,10 @@ struct Grid<'a> {
     base: Table,
     request: &'a Request,
     /// Keys with values of their own, and those that each combination has.
-    columns: Vec<Column>,
+    columns: Vec<VaryingColumn>,
     rows: Vec<Vec<Value>>,
     /// Keys with the expressions that determine them.
-    lets: Vec<(Column, &'a str)>,
+    lets: Vec<(VaryingColumn, &'a str)>,
 }
 
 impl<'a> Grid<'a> {
@@ -261,7 +267,7 @@ impl<'a> Grid<'a> {
         })
     }
 
-    fn columns(&self) -> impl Iterator<Item = &Column> {
+    fn columns(&self) -> impl Iterator<Item = &VaryingColumn> {
         self.columns
             .iter()
             .chain(self.lets.iter().map(|(column, _)| column))
@@ -284,7 +290,7 @@ impl<'a> Grid<'a> {
         }
         let others = refusals.len().saturating_sub(1);
         if let Some((combination, values, error)) = refusals.into_iter().next() {
-            let names = self.columns().map(|column| column.shown.name.as_str());
+            let names = self.columns().map(|column| column.varying.name.as_str());
             return Err(failed(
                 combination,
                 described(names, &values),
@@ -323,7 +329,10 @@ impl<'a> Grid<'a> {
         for (column, expression) in &self.lets {
             let whole = self.whole(&table)?;
             let value = computed(column, expression, &whole).map_err(|why| {
-                refused("--let", Problem::new(&column.shown.name, *expression, why))
+                refused(
+                    "--let",
+                    Problem::new(&column.varying.name, *expression, why),
+                )
             })?;
             values.push(cell_text(&value));
             set(&mut table, &column.key.path, value);
@@ -382,7 +391,7 @@ impl<'a> Grid<'a> {
 }
 
 /// The value of a key by an expression of other keys.
-fn computed(column: &Column, expression: &str, whole: &Value) -> Result<Value, String> {
+fn computed(column: &VaryingColumn, expression: &str, whole: &Value) -> Result<Value, String> {
     let number = expression::value(expression, Some(&|name| value_of(whole, name)))?;
     column
         .key
@@ -403,9 +412,9 @@ fn axis(word: &str) -> Result<Axis, Problem> {
         .ok_or_else(|| Problem::new("--vary", word, example))?;
     let name = name.trim();
     let text = text.trim();
-    let column = Column::named(name, text, false)?;
+    let column = VaryingColumn::named(name, text, false)?;
     let key = &column.key;
-    let is_numeric = column.shown.holds != Holds::Texts;
+    let is_numeric = column.varying.holds != Holds::Texts;
     if text.is_empty() {
         return Err(Problem::new(
             name,
@@ -477,21 +486,21 @@ fn wrong_range() -> String {
 }
 
 /// `KEY = EXPRESSION`.
-fn binding(word: &str) -> Result<(Column, &str), Problem> {
+fn binding(word: &str) -> Result<(VaryingColumn, &str), Problem> {
     let example = "KEY = EXPRESSION, e.g. pulse.energy_j = 0.06/laser.pulse_repetition_hz";
     let (name, text) = word
         .split_once('=')
         .ok_or_else(|| Problem::new("--let", word, example))?;
-    let column = Column::named(name, text, true)?;
+    let column = VaryingColumn::named(name, text, true)?;
     let text = text.trim();
-    if column.shown.holds == Holds::Texts {
+    if column.varying.holds == Holds::Texts {
         return Err(Problem::new(
-            &column.shown.name,
+            &column.varying.name,
             text,
             "an expression is a number, and this key is none",
         ));
     }
-    expression::value(text, None).map_err(|why| Problem::new(&column.shown.name, text, why))?;
+    expression::value(text, None).map_err(|why| Problem::new(&column.varying.name, text, why))?;
     Ok((column, text))
 }
 
@@ -512,7 +521,7 @@ fn list_of_table(table: &TextTable) -> Result<Axis, Problem> {
     }
     let mut columns = Vec::with_capacity(table.header.len());
     for name in &table.header {
-        columns.push(Column::named(name, "", false)?);
+        columns.push(VaryingColumn::named(name, "", false)?);
     }
     let mut rows = Vec::with_capacity(table.rows.len());
     for cells in &table.rows {

@@ -3,10 +3,10 @@
 //! a dominates b if it is nowhere worse and somewhere better. Equal points all stay; a point with a value that is not finite is
 //! never on the front and dominates none. Check: the stored fronts, and every pair of 1000 random points.
 
-use super::stored::Row;
+use super::stored::CaseResult;
 
 /// The rows on the front of precision and resolution, in their order.
-pub(super) fn on_front(rows: &[Row]) -> Vec<&Row> {
+pub(super) fn on_front(rows: &[CaseResult]) -> Vec<&CaseResult> {
     let resolution_m = rows.iter().map(|row| row.result("resolution_m")).collect();
     let std_m_s = rows.iter().map(|row| row.result("std_m_s")).collect();
     let mut found = Vec::new();

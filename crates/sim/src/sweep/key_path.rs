@@ -210,7 +210,7 @@ pub(super) enum Holds {
 }
 
 impl Holds {
-    pub(super) fn of(kind: &Kind) -> Self {
+    pub(super) fn from_kind(kind: &Kind) -> Self {
         match kind {
             Kind::Number => Self::Numbers,
             Kind::Whole { .. } => Self::WholeNumbers,

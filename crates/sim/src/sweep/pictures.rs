@@ -5,7 +5,7 @@
 use super::front::on_front;
 use super::key_path::Holds;
 use super::results::results;
-use super::stored::{Definition, Row};
+use super::stored::{CaseResult, Definition};
 use crate::Error;
 use crate::outputs::Outputs;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -56,7 +56,7 @@ const MOST_CURVES: usize = 6;
 /// The pictures: of each key that is a number, and the front.
 pub(super) fn list(
     definition: &Definition,
-    rows: Option<&[Row]>,
+    rows: Option<&[CaseResult]>,
     files: &mut Outputs,
 ) -> Result<(), Error> {
     for name in definition
@@ -84,7 +84,7 @@ pub(super) fn list(
 /// A panel of a result against a key; none where no case has any.
 fn against(
     definition: &Definition,
-    rows: &[Row],
+    rows: &[CaseResult],
     key: &str,
     (title, label, is_log, [result, bound]): &(&str, &str, bool, [&str; 2]),
 ) -> Option<CurvePlot> {
@@ -138,7 +138,7 @@ fn against(
 }
 
 /// Finite values of a result against a key, in the order of the key.
-fn points(rows: &[&Row], key: &str, result: &str) -> Vec<(f64, f64)> {
+fn points(rows: &[&CaseResult], key: &str, result: &str) -> Vec<(f64, f64)> {
     let mut points = Vec::new();
     for row in rows {
         let x = row.key(key);
@@ -162,8 +162,12 @@ fn standard_error_of<'a>(
 }
 
 /// Cases that differ in one key alone belong to one curve; all to one without a name where there are too many.
-fn curves<'r>(definition: &Definition, rows: &'r [Row], key: &str) -> Vec<(String, Vec<&'r Row>)> {
-    let mut curves: Vec<(String, Vec<&Row>)> = Vec::new();
+fn curves<'r>(
+    definition: &Definition,
+    rows: &'r [CaseResult],
+    key: &str,
+) -> Vec<(String, Vec<&'r CaseResult>)> {
+    let mut curves: Vec<(String, Vec<&CaseResult>)> = Vec::new();
     for row in rows {
         let mut labels = Vec::new();
         for other in definition.free() {
@@ -186,7 +190,7 @@ fn curves<'r>(definition: &Definition, rows: &'r [Row], key: &str) -> Vec<(Strin
 }
 
 /// Precision against resolution, with the front.
-fn front(rows: &[Row]) -> CurvePlot {
+fn front(rows: &[CaseResult]) -> CurvePlot {
     let mut best = Vec::new();
     for row in on_front(rows) {
         best.push((row.result("resolution_m"), row.result("std_m_s")));

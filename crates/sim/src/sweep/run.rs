@@ -102,7 +102,7 @@ pub fn run(
     settings: Settings,
     observer: &dyn Observer,
 ) -> Result<Summary, Error> {
-    let definition = Definition::of(sweep, !settings.no_circulation);
+    let definition = Definition::from_sweep(sweep, !settings.no_circulation);
     let continues = settings.resume && definition.is_in(out);
     let existing = Existing::with_overwrite(settings.overwrite || continues);
     if !settings.overwrite {

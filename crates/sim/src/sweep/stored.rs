@@ -21,7 +21,7 @@ const SCENE: &str = "scene.toml";
 
 /// The result of a case, each value as the text of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Row {
+pub(super) struct CaseResult {
     source: String,
     pub(super) scene_hash: String,
     pub(super) case: usize,
@@ -30,7 +30,7 @@ pub(super) struct Row {
     results: BTreeMap<String, String>,
 }
 
-impl Row {
+impl CaseResult {
     /// A result as a number; NaN where it is none.
     pub(super) fn result(&self, name: &str) -> f64 {
         self.results
@@ -64,7 +64,7 @@ pub(super) struct Definition {
 }
 
 impl Definition {
-    pub(super) fn of(sweep: &Sweep, fits: bool) -> Self {
+    pub(super) fn from_sweep(sweep: &Sweep, fits: bool) -> Self {
         let Provenance {
             program,
             scene_toml,
@@ -157,7 +157,7 @@ impl Definition {
         results: &[f64],
         existing: Existing,
     ) -> Result<(), Error> {
-        let mut row = Row {
+        let mut row = CaseResult {
             source: crate::PROGRAM.into(),
             scene_hash: case.scene.hash.clone(),
             case: case.index,
@@ -182,9 +182,9 @@ impl Definition {
     }
 
     /// The result of a case in a folder; none where there is none of this scene by this version of the program.
-    pub(super) fn stored(&self, folder: &Path, case: usize) -> Option<Row> {
+    pub(super) fn stored(&self, folder: &Path, case: usize) -> Option<CaseResult> {
         let text = text_file::read(&folder_of(folder, case).join(RESULT)).ok()?;
-        let row: Row = serde_json::from_str(&text).ok()?;
+        let row: CaseResult = serde_json::from_str(&text).ok()?;
         let is_this = (row.case, row.circulation) == (case, self.circulation)
             && (Some(&row.scene_hash), &row.source) == (self.scene_hashes.get(case), &self.source)
             && self.keys.iter().all(|key| row.keys.contains_key(&key.name))

@@ -6,7 +6,7 @@ use super::cases::Sweep;
 use super::front::on_front;
 use super::key_path::{Holds, VaryingKey};
 use super::results::results;
-use super::stored::{Definition, Row, SWEEP};
+use super::stored::{CaseResult, Definition, SWEEP};
 use crate::Error;
 use crate::io::{Existing, Table};
 use crate::outputs::Outputs;
@@ -28,7 +28,7 @@ pub fn merge(
         let found = Definition::read(folder)?;
         let asked = sweep.map(|sweep| {
             (
-                Definition::of(sweep, found.circulation),
+                Definition::from_sweep(sweep, found.circulation),
                 "the requested sweep".into(),
             )
         });
@@ -81,7 +81,7 @@ pub(super) fn names(definition: &Definition) -> Result<Vec<String>, Error> {
 /// Writes the tables of all rows.
 pub(super) fn write(
     definition: &Definition,
-    rows: &[Row],
+    rows: &[CaseResult],
     out: &Path,
     existing: Existing,
 ) -> Result<Vec<PathBuf>, Error> {
@@ -94,7 +94,7 @@ pub(super) fn write(
 /// The files of all cases, whose rows are not there before they are run.
 pub(super) fn list(
     definition: &Definition,
-    rows: Option<&[Row]>,
+    rows: Option<&[CaseResult]>,
     files: &mut Outputs,
 ) -> Result<(), Error> {
     files.table("results", rows, |rows| Ok(table(definition, rows)))?;
@@ -105,8 +105,8 @@ pub(super) fn list(
     Ok(())
 }
 
-fn table<'r>(definition: &Definition, rows: impl IntoIterator<Item = &'r Row>) -> Table {
-    let rows: Vec<&Row> = rows.into_iter().collect();
+fn table<'r>(definition: &Definition, rows: impl IntoIterator<Item = &'r CaseResult>) -> Table {
+    let rows: Vec<&CaseResult> = rows.into_iter().collect();
     let mut table = Table::new().int("case", rows.iter().map(|row| row.case as i64));
     for VaryingKey { name, holds, .. } in &definition.keys {
         table = match holds {
@@ -126,7 +126,7 @@ fn table<'r>(definition: &Definition, rows: impl IntoIterator<Item = &'r Row>) -
 /// Whole numbers below this are doubles without a loss.
 const EXACT_BELOW: f64 = 9_007_199_254_740_992.0;
 
-fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
+fn netcdf(definition: &Definition, rows: &[CaseResult]) -> Result<Vec<u8>, Error> {
     use crate::io::netcdf::{Data, Layout, Variable};
     use crate::keys::unit_of;
     let mut width = 1;

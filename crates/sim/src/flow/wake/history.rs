@@ -15,7 +15,7 @@ use wakescope_les::analysis::{VortexRecord, WakeRecord, WakeScales};
 
 /// What a number is.
 #[derive(Debug)]
-pub(super) struct Kind {
+pub(super) struct NumberKind {
     /// The end of its name in tables.
     pub(super) suffix: &'static str,
     /// Its unit in NetCDF.
@@ -26,38 +26,38 @@ pub(super) struct Kind {
     pub(super) unit: fn(&WakeScales) -> f64,
 }
 
-const LENGTH: &Kind = &Kind {
+const LENGTH: &NumberKind = &NumberKind {
     suffix: "_m",
     udunits: "m",
     is_named: false,
     unit: |s| s.spacing_m,
 };
-const GAMMA: &Kind = &Kind {
+const GAMMA: &NumberKind = &NumberKind {
     suffix: "_m2_s",
     udunits: "m2 s-1",
     is_named: false,
     unit: |s| s.circulation_m2_s,
 };
 /// The tag of 1/s in column names, which readers of tables know: `_per_s` would read as seconds.
-const RATE: &Kind = &Kind {
+const RATE: &NumberKind = &NumberKind {
     suffix: "_hz",
     udunits: "s-1",
     is_named: false,
     unit: |s| 1.0 / s.time_unit_s(),
 };
-const ENERGY: &Kind = &Kind {
+const ENERGY: &NumberKind = &NumberKind {
     suffix: "_m4_s2",
     udunits: "m4 s-2",
     is_named: true,
     unit: |s| (s.spacing_m * s.descent_speed_m_s()).powi(2),
 };
-const ENSTROPHY: &Kind = &Kind {
+const ENSTROPHY: &NumberKind = &NumberKind {
     suffix: "_m2_s2",
     udunits: "m2 s-2",
     is_named: true,
     unit: |s| s.descent_speed_m_s() * s.descent_speed_m_s(),
 };
-const NUMBER: &Kind = &Kind {
+const NUMBER: &NumberKind = &NumberKind {
     suffix: "",
     udunits: "1",
     is_named: false,
@@ -65,17 +65,17 @@ const NUMBER: &Kind = &Kind {
 };
 
 /// Kinds whose names end in a unit; none of the ends is that of another.
-pub(super) const SCALED: [&Kind; 5] = [LENGTH, GAMMA, RATE, ENERGY, ENSTROPHY];
+pub(super) const SCALED: [&NumberKind; 5] = [LENGTH, GAMMA, RATE, ENERGY, ENSTROPHY];
 
 type OfVortex = (
     &'static str,
-    &'static Kind,
+    &'static NumberKind,
     &'static str,
     fn(&VortexRecord) -> f64,
 );
 type OfFlow = (
     &'static str,
-    &'static Kind,
+    &'static NumberKind,
     &'static str,
     fn(&WakeRecord) -> f64,
 );
@@ -203,9 +203,9 @@ fn variable(
 }
 
 /// A number of all records.
-struct Column {
+struct HistoryColumn {
     name: String,
-    kind: &'static Kind,
+    kind: &'static NumberKind,
     /// What it is, in words.
     text: String,
     /// In SI units.
@@ -281,7 +281,7 @@ impl WakeRun {
     }
 
     /// The numbers that tables have, those over their first value first.
-    fn columns(&self) -> Vec<Column> {
+    fn columns(&self) -> Vec<HistoryColumn> {
         let [from, to] = self.setup.circulation_radii_m;
         let radii_tag = format!("_{from}_{to}").replace('.', "p");
         let radii = format!(" from {from:?} to {to:?} m");
@@ -292,7 +292,7 @@ impl WakeRun {
             for value in &mut values {
                 *value /= first;
             }
-            out.push(Column {
+            out.push(HistoryColumn {
                 name: format!("gamma_ratio_{which}"),
                 kind: NUMBER,
                 text: format!("{}{radii}, over its first value", VORTEX[0].2),
@@ -305,7 +305,7 @@ impl WakeRun {
                     0 => (radii_tag.as_str(), radii.as_str()),
                     _ => ("", ""),
                 };
-                out.push(Column {
+                out.push(HistoryColumn {
                     name: format!("{name}{tag}_{which}"),
                     kind,
                     text: format!("{which} vortex: {text}{radii}"),
@@ -314,7 +314,7 @@ impl WakeRun {
             }
         }
         for (i, (name, kind, text, _)) in FLOW.iter().enumerate() {
-            out.push(Column {
+            out.push(HistoryColumn {
                 name: (*name).into(),
                 kind,
                 text: (*text).into(),
@@ -323,7 +323,7 @@ impl WakeRun {
         }
         let [.., modes, _] = self.starts();
         for mode in 0..self.modes().min(TABLE_MODES + 1) {
-            out.push(Column {
+            out.push(HistoryColumn {
                 name: format!("energy_mode_{mode}"),
                 kind: ENERGY,
                 text: format!("kinetic energy of axial mode {mode}, per length of x"),
