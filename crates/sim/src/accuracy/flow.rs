@@ -371,7 +371,9 @@ mod tests {
         );
         let none = refused(PLATES, &[Metric::Height]);
         assert!(
-            none.contains("--of: height is no metric of this case, which has: energy, dissipation"),
+            none.contains(
+                "--of: height is not a metric of this case, which has: energy, dissipation"
+            ),
             "{none}"
         );
         // Of air at rest nothing is assessed, so that nothing could be within the error.

@@ -53,7 +53,7 @@ impl Request {
             let known = names.join(", ");
             return Err(Error::input(
                 Path::new("--of"),
-                format!("{name} is no metric of this {subject}, which has: {known}"),
+                format!("{name} is not a metric of this {subject}, which has: {known}"),
             ));
         }
         if available.is_empty() {

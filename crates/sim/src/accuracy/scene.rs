@@ -482,9 +482,9 @@ mod tests {
         for (metric, expected) in [
             (
                 Metric::V,
-                "v is no metric of this scene, which has: efficiency, bias, std, rms",
+                "v is not a metric of this scene, which has: efficiency, bias, std, rms",
             ),
-            (Metric::Energy, "energy is no metric of this scene"),
+            (Metric::Energy, "energy is not a metric of this scene"),
         ] {
             let request = Request {
                 within: 0.1,

@@ -244,7 +244,7 @@ fn add_power(power: &Power, lines: &mut Vec<String>) {
     let doubt = if (1.5..2.6).contains(&beta) {
         ""
     } else {
-        " (should be near 2: is the noise what was stated?)"
+        " (should be near 2: is the stated noise right?)"
     };
     let law = format!("Gumbel's mu {mu:.2}, beta {beta:.2}{doubt}");
     lines.push(format!(

@@ -310,7 +310,7 @@ fn read_input(
 ) -> Result<Input, Error> {
     if matches!(args.method, Method::Signals | Method::Envelope) && !is_signals(path) {
         let reason =
-            "it is no file of raw signals, which this method needs: --method fit takes maps";
+            "it is not a file of raw signals, which this method needs: --method fit takes maps";
         return Err(Error::input(path, reason));
     }
     let keeps_spectra = args.method == Method::Envelope;
@@ -398,7 +398,7 @@ fn of_map(
 
 /// Why the best fit of a scan is no wake, in words.
 fn no_wake_since(scan: &ReadScan, reason: &str) -> String {
-    format!("sweep {}: the best fit is no wake: {reason}", scan.sweep)
+    format!("sweep {}: the best fit is not a wake: {reason}", scan.sweep)
 }
 
 fn of_signals(

@@ -48,7 +48,7 @@ impl TextTable {
             Some(first) if are_numbers(first) => commented_header(text, separator, first.len())?,
             _ => records
                 .next()
-                .ok_or("no header: the first line that is no comment names the columns")?,
+                .ok_or("no header: the first line that is not a comment names the columns")?,
         };
         for name in &mut header {
             *name = name.trim().to_owned();

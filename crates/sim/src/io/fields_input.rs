@@ -88,12 +88,12 @@ fn reference_date(file: &NetcdfFile, variable: &str) -> Option<UtcTime> {
 /// Times of WRF where they are texts alone: in s after the start of the run, or else after the first of them.
 fn wrf_times(file: &NetcdfFile) -> Result<(Vec<f64>, Option<UtcTime>), String> {
     let texts = file.texts("Times").map_err(|_| {
-        "it has no times: a variable of the name of its time dimension is needed".to_owned()
+        "it has no times: a variable with the name of its time dimension is needed".to_owned()
     })?;
     let mut dates = Vec::with_capacity(texts.len());
     for text in &texts {
         let (date, _) = UtcTime::parse_reference(text)
-            .ok_or("a text of its variable Times is no date such as 2024-01-31_12:00:00")?;
+            .ok_or("a text of its variable Times is not a date such as 2024-01-31_12:00:00")?;
         dates.push(date);
     }
     let stated = ["SIMULATION_START_DATE", "START_DATE"]
@@ -183,7 +183,7 @@ fn component(
     };
     if let Some(at) = values.iter().position(|v| !v.is_finite()) {
         return Err(format!(
-            "{name} is missing or not finite at place {at}: cut what the terrain hides, or fill it"
+            "{name} is missing or not finite at index {at}: cut what the terrain hides, or fill it"
         ));
     }
     Ok(VolumeComponent { nodes_m, values })

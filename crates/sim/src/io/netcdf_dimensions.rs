@@ -173,7 +173,7 @@ impl NetcdfFile {
             .map_err(|_| format!("the coordinate of {shown} cannot be read"))?;
         if self.length(dim) != Some(values.len() as u64) {
             return Err(format!(
-                "the coordinate of {shown} has not the length of its dimension"
+                "the coordinate of {shown} does not have the length of its dimension"
             ));
         }
         if falls(&values) {
@@ -284,7 +284,7 @@ impl NetcdfFile {
         axes.sort_by_key(|at| order.iter().position(|own| own == dims[*at]));
         axes.extend(spare);
         let mut stored = ArrayD::from_shape_vec(lengths, values)
-            .map_err(|_| format!("{name} has not the lengths of its dimensions"))?;
+            .map_err(|_| format!("{name} does not have the lengths of its dimensions"))?;
         for at in turned {
             stored.invert_axis(Axis(at));
         }

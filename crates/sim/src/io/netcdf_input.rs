@@ -25,11 +25,11 @@ const MOST_EXPANDED: f64 = 1032.0;
 /// What the library of NetCDF stores where no float was written.
 pub(crate) const DEFAULT_FILL: f64 = 9.969_209_968_386_869e36;
 
-const OTHER: &str = "it is no NetCDF file; classic NetCDF is needed, from xarray with to_netcdf(\"out.nc\", \
+const OTHER: &str = "it is not a NetCDF file; classic NetCDF is needed, from xarray with to_netcdf(\"out.nc\", \
                      format=\"NETCDF3_64BIT\")";
 /// Messages of a file that the library does not read: its own would repeat bytes of a file that may be anything.
 const UNSOUND: &str =
-    "it is no sound NetCDF file: its header is damaged, or counts more than the file holds";
+    "it is not a valid NetCDF file: its header is damaged, or counts more than the file holds";
 const UNSOUND_HDF5: &str = "it is NetCDF-4 (HDF5), but damaged or of a kind that is not read: nccopy -k nc6 in.nc out.nc makes classic \
                             NetCDF of it";
 /// How NetCDF-4 becomes classic.

@@ -243,7 +243,7 @@ fn files_of_other_kinds_name_the_remedy_and_nothing_of_their_content() {
     assert!(broken.contains("nccopy -k nc6"), "{broken}");
     let text = planes_of("root:x:0:0:secret\n".repeat(300).as_bytes()).unwrap_err();
     assert!(
-        text.contains("no NetCDF file") && !text.contains("root"),
+        text.contains("not a NetCDF file") && !text.contains("root"),
         "{text}"
     );
     #[cfg(unix)]
@@ -257,7 +257,7 @@ fn packed_and_missing_values_are_understood() {
     assert!(
         planes_of(&packed.bytes())
             .unwrap_err()
-            .contains("v is missing or not finite at place 0")
+            .contains("v is missing or not finite at index 0")
     );
     let y = [
         ("scale_factor", 0.5),

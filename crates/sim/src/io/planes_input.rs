@@ -73,7 +73,7 @@ fn planes(file: &NetcdfFile) -> Result<CrossPlanes, String> {
     let dims = file.roles("v", [TIME, Z, Y])?;
     let others = file.roles("w", [TIME, Z, Y])?;
     if dims != others {
-        return Err("v and w have not the same dimensions".into());
+        return Err("v and w do not have the same dimensions".into());
     }
     let [time, z, y] = &dims;
     let z_m = file.coordinate_m(z)?;
@@ -110,10 +110,10 @@ fn component(
 ) -> Result<Array3<f64>, String> {
     let values = file.velocities(name, dims, None)?;
     if let Some(index) = values.iter().position(|v| !v.is_finite()) {
-        return Err(format!("{name} is missing or not finite at place {index}"));
+        return Err(format!("{name} is missing or not finite at index {index}"));
     }
     Array3::from_shape_vec(shape, values)
-        .map_err(|_| format!("{name} has not the lengths of its coordinates"))
+        .map_err(|_| format!("{name} does not have the lengths of its coordinates"))
 }
 
 /// Whether the planes lie along their ages.
@@ -328,7 +328,7 @@ mod tests {
         let message = read(&folder.path().join("other.nc"))
             .unwrap_err()
             .to_string();
-        assert!(message.contains("no NetCDF file"), "{message}");
+        assert!(message.contains("not a NetCDF file"), "{message}");
     }
 
     #[test]

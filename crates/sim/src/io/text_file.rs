@@ -21,7 +21,7 @@ pub(crate) fn open(path: &Path) -> Result<(File, u64)> {
     }
     if !about.is_file() {
         let reason =
-            "it is no regular file but a device or a pipe: write its content to a file first";
+            "it is not a regular file but a device or a pipe: write its content to a file first";
         return Err(Error::new(ErrorKind::InvalidInput, reason));
     }
     Ok((File::open(path)?, about.len()))
@@ -112,7 +112,7 @@ pub(crate) fn read(path: &Path) -> Result<String> {
     decode(&bytes).map_err(|at| {
         Error::new(
             ErrorKind::InvalidData,
-            format!("it is no text in UTF-8: byte {} is not", at + 1),
+            format!("it is not text in UTF-8: byte {} is not", at + 1),
         )
     })
 }

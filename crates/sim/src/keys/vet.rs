@@ -56,7 +56,7 @@ impl<'a> Text<'a> {
                     path: path.to_owned(),
                     line: breaks.partition_point(|end| *end < index) + 1,
                     message: format!(
-                        "{}this is no valid TOML: {}",
+                        "{}this is not valid TOML: {}",
                         key.unwrap_or_default(),
                         error.message().replace('\n', " ")
                     ),

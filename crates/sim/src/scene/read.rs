@@ -289,7 +289,7 @@ mod tests {
             ]
         );
         assert!(message("[pulse]\nenergy_j = nan\n").contains("s.toml:2: pulse.energy_j = nan is"));
-        assert!(message("[pulse\n").starts_with("s.toml:1: this is no valid TOML: "));
+        assert!(message("[pulse\n").starts_with("s.toml:1: this is not valid TOML: "));
     }
 
     #[test]

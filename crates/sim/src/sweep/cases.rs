@@ -570,6 +570,6 @@ fn value_of(whole: &Value, name: &str) -> Result<f64, String> {
         Some(other) => Err(format!(
             "{name} is {other}, and only numbers can be computed with"
         )),
-        None => Err(format!("{name} is no key of this scene")),
+        None => Err(format!("{name} is not a key of this scene")),
     }
 }

@@ -32,7 +32,7 @@ pub(crate) fn value(text: &str, values: Values<'_>) -> Result<f64, String> {
         .map_err(|reason| format!("\"{}\" cannot be computed: {reason}", text.trim()))
 }
 
-/// Whether `a <= b`, or the same with `>=`, `<` or `>`, holds; false where a side is no number.
+/// Whether `a <= b`, or the same with `>=`, `<` or `>`, holds; false where a side is not a number.
 ///
 /// # Errors
 /// No comparison; as [`value`].
@@ -48,7 +48,7 @@ pub(crate) fn holds(text: &str, values: Values<'_>) -> Result<bool, String> {
         .into_iter()
         .find_map(|(operator, compare)| Some((text.split_once(operator)?, compare)));
     let ((left, right), compare) = found.ok_or_else(|| {
-        format!("\"{text}\" is no comparison: two expressions with <=, >=, < or > between")
+        format!("\"{text}\" is not a comparison: two expressions with <=, >=, < or > between")
     })?;
     Ok(compare(&value(left, values)?, &value(right, values)?))
 }
@@ -77,7 +77,7 @@ fn combined(a: f64, operator: char, b: f64) -> Result<f64, String> {
         _ => a.powf(b),
     };
     if value.is_nan() && !a.is_nan() && !b.is_nan() {
-        return Err(format!("{a:?} {operator} {b:?} is no number"));
+        return Err(format!("{a:?} {operator} {b:?} is not a number"));
     }
     Ok(value)
 }
@@ -237,7 +237,7 @@ mod tests {
             ("1.2.3", "a number, e.g."),
             ("colour*2", "colour is unknown"),
             ("", "at its end"),
-            ("(0-1)^0.5", "is no number"),
+            ("(0-1)^0.5", "is not a number"),
         ] {
             let message = value(text).unwrap_err();
             assert!(message.contains(wanted), "{text}: {message}");
@@ -266,6 +266,6 @@ mod tests {
         assert_eq!(holds("laser.prf_hz < 400"), Ok(false));
         assert_eq!(holds("laser.prf_hz >= 400"), Ok(true));
         assert_eq!(holds("1 > 2"), Ok(false));
-        assert!(holds("laser.prf_hz").unwrap_err().contains("no comparison"));
+        assert!(holds("laser.prf_hz").unwrap_err().contains("not a comparison"));
     }
 }

@@ -160,15 +160,15 @@ fn wrong_options_are_refused_with_what_is_allowed() {
         ("s.toml --within 3% --of colour", "possible values"),
         (
             "s.toml --within 3% --of u",
-            "u is no metric of this scene, which has: bias, std, rms",
+            "u is not a metric of this scene, which has: bias, std, rms",
         ),
         (
             "s.toml --within 3% --of height",
-            "height is no metric of this scene",
+            "height is not a metric of this scene",
         ),
         (
             "c.toml --within 3% --of rms",
-            "rms is no metric of this case",
+            "rms is not a metric of this case",
         ),
         ("s.toml --within 3% --budget 10", "--budget"),
     ] {

@@ -406,7 +406,7 @@ fn the_scan_of_a_weather_radar_is_no_wake_and_the_reason_is_given() {
         let flags = text(&table, 0, "flags");
         assert!(flags.contains("no_wake implausible"), "{method}: {flags}");
         assert!(
-            warned.contains("radar.csv: sweep 0: the best fit is no wake: the "),
+            warned.contains("radar.csv: sweep 0: the best fit is not a wake: the "),
             "{method}: {warned}"
         );
     }

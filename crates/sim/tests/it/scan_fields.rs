@@ -217,7 +217,7 @@ fn fields_in_netcdf4_are_read_time_by_time() {
     );
     let message = unwritten.unwrap_err().to_string();
     assert!(
-        message.contains("unwritten is missing or not finite at place"),
+        message.contains("unwritten is missing or not finite at index"),
         "{message}"
     );
 }

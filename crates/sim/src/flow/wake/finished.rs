@@ -37,10 +37,10 @@ impl FinishedWake {
     pub fn read(folder: &Path) -> Result<Self, Error> {
         let file = CaseFile::read(&folder.join("case.toml"))?;
         let CaseKind::Wake(flow) = &file.content.case else {
-            return Err(Error::input(folder, "the case is no wake"));
+            return Err(Error::input(folder, "the case is not a wake"));
         };
         let Some(output) = file.content.wake.clone() else {
-            return Err(Error::input(folder, "the case is no wake"));
+            return Err(Error::input(folder, "the case is not a wake"));
         };
         let flow = (**flow).clone();
         let scales = flow.pair.scales().map_err(Error::Flow)?;
@@ -63,7 +63,7 @@ impl FinishedWake {
         let last = (output.end_tau / output.every_tau + 1e-6).floor() * output.every_tau;
         if reached < last - 1e-9 {
             let end = output.end_tau;
-            let reason = format!("the run stands at tau = {reached} of {end}");
+            let reason = format!("the run has reached tau = {reached} of {end}");
             return Err(Error::input(folder, reason));
         }
         Ok(wake)
@@ -135,7 +135,7 @@ fn in_units_of_the_pair(
 /// Columns of a table by name; empty cells are NaN.
 ///
 /// # Errors
-/// A file that cannot be read; a value that is no number.
+/// A file that cannot be read; a value that is not a number.
 pub fn table(path: &Path) -> Result<HashMap<String, Vec<f64>>, Error> {
     let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
     let table = TextTable::parse(&text).map_err(|reason| Error::input(path, reason))?;
@@ -148,7 +148,7 @@ pub fn table(path: &Path) -> Result<HashMap<String, Vec<f64>>, Error> {
                 "" => f64::NAN,
                 cell => cell
                     .parse()
-                    .map_err(|_| Error::input(path, format!("{cell} is no number")))?,
+                    .map_err(|_| Error::input(path, format!("{cell} is not a number")))?,
             });
         }
         columns.insert(name.clone(), values);

@@ -270,7 +270,7 @@ mod tests {
             FinishedWake::read(folder.path())
                 .unwrap_err()
                 .to_string()
-                .contains("the run stands at tau = ")
+                .contains("the run has reached tau = ")
         );
         case.time.pause_after_steps = None;
         run(&file(&case), folder.path(), Begin::Restart, &Silent).unwrap();

@@ -336,7 +336,7 @@ fn duplicate(file: &File) -> Result<File, String> {
 fn binary_array(format: &RawFormat, samples: usize, length: u64) -> Result<StoredArray, String> {
     let name = format.number.as_deref().unwrap_or_default();
     let number = NumberType::named(name)
-        .ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
+        .ok_or_else(|| format!("{name} is not a number type: --format i16, for example"))?;
     let array = StoredArray {
         number,
         byte_order: format.byte_order,

@@ -98,7 +98,7 @@ fn second_quadrature(
     match file.shape(&second).as_deref() == Some(lengths) {
         true => Ok(Some(second)),
         false => Err(format!(
-            "variable {second} has not the dimensions of {name}"
+            "variable {second} does not have the dimensions of {name}"
         )),
     }
 }

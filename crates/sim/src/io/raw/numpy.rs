@@ -20,9 +20,9 @@ pub(super) struct StoredArray {
 }
 
 const TRUNCATED: &str = "it is cut short: it ends before its last array does";
-const NO_ARRAY: &str = "it is no sound NPY file: its header is damaged";
+const NO_ARRAY: &str = "it is not a valid NPY file: its header is damaged";
 const NO_ARCHIVE: &str =
-    "it is no sound NPZ file: it is cut short, or its table of contents is damaged";
+    "it is not a valid NPZ file: it is cut short, or its table of contents is damaged";
 /// Longest header that is read \[bytes\].
 const LONGEST_HEADER_BYTES: u64 = 1 << 20;
 

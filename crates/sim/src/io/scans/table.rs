@@ -159,7 +159,7 @@ impl<'t> Columns<'t> {
             .map_or(0.0, |column| self.table.number(row, column));
         match sweep >= 0.0 && sweep.fract() == 0.0 {
             true => Ok(sweep as u64),
-            false => Err(format!("row {}: sweep is no whole number", row + 1)),
+            false => Err(format!("row {}: sweep is not a whole number", row + 1)),
         }
     }
 
@@ -174,7 +174,9 @@ impl<'t> Columns<'t> {
         let range_m = self.rounded(self.range_m[row]);
         let mut elevation_rad = self.elevation_rad[row];
         if !(range_m.is_finite() && elevation_rad.is_finite()) {
-            return Err(format!("row {number}: its range or elevation is no number"));
+            return Err(format!(
+                "row {number}: its range or elevation is not a number"
+            ));
         }
         if self.is_own {
             elevation_rad = f64::from(elevation_rad.to_degrees() as f32).to_radians();
@@ -182,7 +184,7 @@ impl<'t> Columns<'t> {
         let velocity_m_s = self.rounded(self.velocity_m_s[row]);
         if velocity_m_s.is_nan() && !is_missing(&cells[self.velocity]) {
             return Err(format!(
-                "row {number}: its velocity is no number; an empty cell is a missing one"
+                "row {number}: its velocity is not a number; leave the cell of a missing one empty"
             ));
         }
         let count = self.count.map(|column| self.table.number(row, column));
