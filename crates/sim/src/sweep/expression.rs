@@ -266,6 +266,10 @@ mod tests {
         assert_eq!(holds("laser.prf_hz < 400"), Ok(false));
         assert_eq!(holds("laser.prf_hz >= 400"), Ok(true));
         assert_eq!(holds("1 > 2"), Ok(false));
-        assert!(holds("laser.prf_hz").unwrap_err().contains("not a comparison"));
+        assert!(
+            holds("laser.prf_hz")
+                .unwrap_err()
+                .contains("not a comparison")
+        );
     }
 }
