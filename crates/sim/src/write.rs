@@ -19,7 +19,9 @@ use crate::measure::recorded::{Recorded, Spectra, measured_map, predicted_table}
 use crate::outputs::Outputs;
 use crate::plan::{Plan, Stage, Target};
 use crate::run::RunResult;
-use crate::scene::{DetectorSignal, NoiseModel, Pattern};
+#[cfg(feature = "plots")]
+use crate::scene::Pattern;
+use crate::scene::{DetectorSignal, NoiseModel};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 

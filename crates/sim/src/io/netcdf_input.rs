@@ -94,7 +94,13 @@ pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
 ///
 /// # Errors
 /// A file of another kind; groups that cannot be read.
-#[cfg_attr(not(feature = "netcdf4"), expect(unused_variables))]
+#[cfg_attr(
+    not(feature = "netcdf4"),
+    expect(
+        unused_variables,
+        reason = "only groups of HDF5 are read from the path"
+    )
+)]
 fn packing(path: &Path, beginning: &[u8]) -> Result<Packing, String> {
     match beginning {
         [b'C', b'D', b'F', 1 | 2 | 5, ..] => Ok(Packing::default()),
