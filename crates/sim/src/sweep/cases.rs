@@ -244,7 +244,7 @@ impl<'a> Grid<'a> {
         if count > MOST_CASES as f64 {
             let why =
                 format!("a sweep has 1 to {MOST_CASES} cases: fewer values, or several sweeps");
-            let problem = Problem::new("number of cases", &format!("{count:?}"), why);
+            let problem = Problem::new("number of cases", format!("{count:?}"), why);
             return Err(refused("sweep", problem));
         }
         let mut combinations = vec![Vec::new()];
@@ -302,7 +302,7 @@ impl<'a> Grid<'a> {
             let why = format!("none of the {} cases is left", self.rows.len());
             return Err(refused(
                 "--where",
-                Problem::new("condition", &self.request.conditions.join(" and "), why),
+                Problem::new("condition", self.request.conditions.join(" and "), why),
             ));
         }
         Ok(cases)

@@ -165,7 +165,7 @@ fn blocks(lengths: &[u64], places: Range<u64>) -> Vec<Vec<Range<u64>>> {
     while at < places.end {
         let first = at / row;
         let rows = (places.end - at) / row;
-        if at % row == 0 && rows > 0 {
+        if at.is_multiple_of(row) && rows > 0 {
             out.push(
                 std::iter::once(first..first + rows)
                     .chain(inner.iter().map(|length| 0..*length))
