@@ -68,8 +68,37 @@ impl SampledPulse {
     /// # Errors
     /// As [`SampledPulse::new`]; [`Error::ElementOutOfRange`] for a negative power.
     pub fn from_power(time_s: &[f64], power: &[f64], energy_j: f64) -> Result<Self, Error> {
+        check_length("power", power.len(), time_s.len())?;
         check_amounts("power", power)?;
         let amplitude: Vec<_> = power.iter().map(|p| Complex::new(p.sqrt(), 0.0)).collect();
+        Self::new(time_s, &amplitude, energy_j)
+    }
+
+    /// A pulse from its power, any unit, and its phase \[rad\] at increasing times \[s\].
+    ///
+    /// # Errors
+    /// As [`SampledPulse::from_power`]; [`Error::ElementOutOfRange`] for a phase that is not finite.
+    pub fn from_power_and_phase(
+        time_s: &[f64],
+        power: &[f64],
+        phase_rad: &[f64],
+        energy_j: f64,
+    ) -> Result<Self, Error> {
+        check_length("power", power.len(), time_s.len())?;
+        check_length("phase_rad", phase_rad.len(), time_s.len())?;
+        check_amounts("power", power)?;
+        let mut amplitude = Vec::with_capacity(power.len());
+        for (index, (power, phase_rad)) in power.iter().zip(phase_rad).enumerate() {
+            if !phase_rad.is_finite() {
+                return Err(Error::ElementOutOfRange {
+                    field: "phase_rad",
+                    index,
+                    value: *phase_rad,
+                    allowed: "finite",
+                });
+            }
+            amplitude.push(Complex::from_polar(power.sqrt(), *phase_rad));
+        }
         Self::new(time_s, &amplitude, energy_j)
     }
 

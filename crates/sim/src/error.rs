@@ -138,7 +138,79 @@ pub enum Error {
     },
 }
 
+/// A field of its input that a library refuses.
+pub(crate) struct RefusedField {
+    /// Its name, with the index of the element of a list.
+    pub(crate) name: String,
+    /// The value found.
+    pub(crate) value: String,
+    /// What is allowed.
+    pub(crate) allowed: String,
+}
+
+impl RefusedField {
+    fn number(name: impl Into<String>, value: f64, allowed: &str) -> Self {
+        Self {
+            name: name.into(),
+            value: format!("{value:?}"),
+            allowed: allowed.into(),
+        }
+    }
+}
+
 impl Error {
+    /// The field that a library refuses, if the error is about one.
+    pub(crate) fn refused_field(&self) -> Option<RefusedField> {
+        use wakescope_estimate::Error as EstimateError;
+        use wakescope_les::Error as WindError;
+        use wakescope_optics::Error as OpticsError;
+        use wakescope_signal::Error as SignalError;
+        match self {
+            Self::Optics(OpticsError::OutOfRange {
+                field,
+                value,
+                allowed,
+            })
+            | Self::Signal(SignalError::OutOfRange {
+                field,
+                value,
+                allowed,
+            })
+            | Self::Estimate(EstimateError::OutOfRange {
+                field,
+                value,
+                allowed,
+            })
+            | Self::Wind(WindError::OutOfRange {
+                field,
+                value,
+                allowed,
+            }) => Some(RefusedField::number(*field, *value, allowed)),
+            Self::Signal(SignalError::ElementOutOfRange {
+                field,
+                index,
+                value,
+                allowed,
+            }) => Some(RefusedField::number(
+                format!("{field}[{index}]"),
+                *value,
+                allowed,
+            )),
+            Self::Signal(SignalError::LengthMismatch {
+                field,
+                found,
+                expected,
+            }) => Some(RefusedField {
+                name: (*field).into(),
+                value: format!("a list of {found}"),
+                allowed: format!(
+                    "a list of {expected} values, as many as the lists beside it have"
+                ),
+            }),
+            _ => None,
+        }
+    }
+
     /// The error of a file that a key names.
     pub(crate) fn of_key(key: &'static str) -> impl Fn(Self) -> Self + Copy {
         move |source| Self::OfKey {

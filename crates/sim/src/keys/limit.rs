@@ -155,6 +155,14 @@ impl<'s> Checker<'s> {
         self.found.is_empty()
     }
 
+    /// Whether a key, one of its elements or a key of its table has a problem.
+    pub(crate) fn has_problem_of(&self, key: &str) -> bool {
+        self.found.iter().any(|problem| {
+            let rest = problem.key.strip_prefix(key);
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        })
+    }
+
     /// A problem whose value is shown as `value` says it.
     pub(crate) fn refuse(&mut self, key: &str, value: &str, allowed: impl Into<String>) {
         self.found.push(Problem::new(key, value, allowed));

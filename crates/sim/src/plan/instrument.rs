@@ -3,9 +3,8 @@
 use crate::Error;
 use crate::scene::{
     DetectorSignal, Digitiser, NoiseModel, RefractiveTurbulence, Scene, ScreenSampling,
-    SnrReference, SpectrumKind,
+    SnrReference,
 };
-use std::sync::Arc;
 use wakescope_optics::{self as optics, plan::Plan as ScreenPlan};
 use wakescope_signal as signal;
 
@@ -49,7 +48,7 @@ impl Instrument {
         };
         let turbulence = scene
             .refractive_turbulence()
-            .map(|t| turbulence(&t))
+            .map(|t| t.simulated())
             .transpose()?;
         Ok(Self {
             telescope,
@@ -169,28 +168,6 @@ fn telescope(scene: &Scene) -> optics::Telescope {
             optics::Focus::At(t.focus_m)
         },
     }
-}
-
-fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Error> {
-    let scales = optics::air::Scales {
-        outer_scale_m: t.outer_scale_m,
-        inner_scale_m: t.inner_scale_m,
-    };
-    let spectrum: Arc<dyn optics::Spectrum> = match t.spectrum {
-        SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(
-            scales,
-            optics::air::CHAPTER_CONSTANT,
-        )?),
-        SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
-        SpectrumKind::HillAndrews => Arc::new(optics::air::HillAndrews::new(scales)?),
-    };
-    Ok(optics::Turbulence {
-        spectrum,
-        cn2: optics::Cn2Path::Uniform {
-            cn2_m_m23: t.cn2_m_m23,
-        }
-        .validated()?,
-    })
 }
 
 /// The receiver of a scene.

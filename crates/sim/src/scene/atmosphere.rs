@@ -1,6 +1,8 @@
 //! Aerosol and refractive turbulence of a scene.
 
 use crate::keys::{ABOVE_ZERO_OR_INF, keys};
+use std::sync::Arc;
+use wakescope_optics as optics;
 use wakescope_signal::Medium;
 
 keys! {
@@ -97,6 +99,34 @@ impl super::Scene {
     }
 }
 
+impl RefractiveTurbulence {
+    /// The turbulence that the optics propagate through.
+    ///
+    /// # Errors
+    /// Fails if the optics refuse its strength or its scales.
+    pub(crate) fn simulated(&self) -> Result<optics::Turbulence, optics::Error> {
+        let scales = optics::air::Scales {
+            outer_scale_m: self.outer_scale_m,
+            inner_scale_m: self.inner_scale_m,
+        };
+        let spectrum: Arc<dyn optics::Spectrum> = match self.spectrum {
+            SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(
+                scales,
+                optics::air::CHAPTER_CONSTANT,
+            )?),
+            SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
+            SpectrumKind::HillAndrews => Arc::new(optics::air::HillAndrews::new(scales)?),
+        };
+        let cn2 = optics::Cn2Path::Uniform {
+            cn2_m_m23: self.cn2_m_m23,
+        };
+        Ok(optics::Turbulence {
+            spectrum,
+            cn2: cn2.validated()?,
+        })
+    }
+}
+
 impl Atmosphere {
     /// The air that the signal simulation looks through.
     ///
@@ -109,6 +139,9 @@ impl Atmosphere {
         let mut range_m = profile.range_m.clone();
         let mut backscatter_per_m_sr = profile.backscatter_per_m_sr.clone();
         let mut extinction_per_m = profile.extinction_per_m.clone();
+        if range_m.is_empty() {
+            return Medium::new(range_m, backscatter_per_m_sr, extinction_per_m);
+        }
         // Beyond the table the air is as at its end, as far as a second-trip echo at the slowest
         // pulse repetition frequency.
         range_m.push(range_m.last().copied().unwrap_or(0.0).max(0.0) + 1e12);

@@ -7,10 +7,10 @@ use super::estimator::check_estimator;
 use super::flow::check_flow;
 use super::retrieval::check_retrieval;
 use super::{
-    DetectorSignal, EfficiencyOfPulse, Outside, PulseShape, Scan, Scene, SnrReference,
-    SpectrumKind, Turbulence,
+    DetectorSignal, EfficiencyOfPulse, Outside, PulseShape, Scene, SnrReference, Turbulence,
 };
-use crate::keys::{Checker, Declared as _, Problem, side};
+use crate::Error;
+use crate::keys::{Checker, Declared, Problem, side};
 
 impl Scene {
     /// Everything in this scene that cannot be simulated; empty for a good scene.
@@ -52,95 +52,46 @@ impl Scene {
     }
 
     fn check_instrument(&self, c: &mut Checker<'_>) {
-        if let PulseShape::Sampled(shape) = &self.pulse.shape {
-            let mut counts = vec![
-                ("pulse.shape.time_s", shape.time_s.len()),
-                ("pulse.shape.power", shape.power.len()),
-            ];
-            counts.extend(
-                Some(("pulse.shape.phase_rad", shape.phase_rad.len()))
-                    .filter(|(_, count)| *count > 0),
-            );
-            check_lengths(&counts, "pulse.shape", c);
-        }
         if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
-            let has_place = t.spectrum != SpectrumKind::HillAndrews || t.inner_scale_m > 0.0;
-            let allowed = "above 0 m with atmosphere.turbulence.spectrum = \"hill_andrews\", whose bump stands at it";
+            let is_needed = !matches!(self.detector.snr, SnrReference::Fixed { .. });
             c.require(
-                has_place,
-                "atmosphere.turbulence.inner_scale_m",
-                t.inner_scale_m,
-                allowed,
-            );
-            let is_asked = !matches!(self.detector.snr, SnrReference::Fixed { .. });
-            let allowed =
-                "\"mean\" with detector.snr.reference = \"fixed\", which asks for no efficiency";
-            let is_one = t.efficiency == EfficiencyOfPulse::Mean;
-            c.require(
-                is_one || is_asked,
+                is_needed || t.efficiency == EfficiencyOfPulse::Mean,
                 "atmosphere.turbulence.efficiency",
                 "realisation",
-                allowed,
+                "\"mean\" with detector.snr.reference = \"fixed\", which asks for no efficiency",
             );
         }
-        if let Some(profile) = &self.atmosphere.profile {
-            let counts = [
-                ("atmosphere.profile.range_m", profile.range_m.len()),
-                (
-                    "atmosphere.profile.backscatter_per_m_sr",
-                    profile.backscatter_per_m_sr.len(),
-                ),
-                (
-                    "atmosphere.profile.extinction_per_m",
-                    profile.extinction_per_m.len(),
-                ),
+        self.check_by_libraries(c);
+    }
+
+    /// What the libraries refuse of the tables that are passed to them as they are.
+    fn check_by_libraries(&self, c: &mut Checker<'_>) {
+        if let (Some(profile), Err(error)) = (&self.atmosphere.profile, self.atmosphere.medium())
+            && !c.has_problem_of("atmosphere.profile")
+        {
+            refuse(c, "atmosphere.profile", profile, error.into());
+        }
+        let shape = &self.pulse.shape;
+        if let (PulseShape::Sampled(_), Err(error)) = (shape, self.pulse.simulated())
+            && !c.has_problem_of("pulse")
+        {
+            refuse(c, "pulse.shape", shape, error.into());
+        }
+        let turbulence = &self.atmosphere.turbulence;
+        let table = "atmosphere.turbulence";
+        if let Turbulence::Refractive(t) = turbulence
+            && !c.has_problem_of(table)
+        {
+            let keys = [
+                "atmosphere.turbulence.outer_scale_m",
+                "atmosphere.turbulence.inner_scale_m",
             ];
-            check_lengths(&counts, "atmosphere.profile", c);
-        }
-        // What is a profile of the air, or a sampled pulse, the simulation of signals knows best.
-        if c.is_good() {
-            if let Err(error) = self.atmosphere.medium() {
-                c.refuse("atmosphere.profile", "", error.to_string());
+            // Limits between keys make sense only once each key does.
+            if c.compare(keys, [t.outer_scale_m, t.inner_scale_m], "above")
+                && let Err(error) = t.simulated()
+            {
+                refuse(c, table, turbulence, error.into());
             }
-            if let Err(error) = self.pulse.simulated() {
-                c.refuse("pulse.shape", "", error.to_string());
-            }
-        }
-    }
-
-    /// Samples recorded of each pulse: from `range_min_m` to `range_max_m`, ends included.
-    pub fn samples_per_record(&self) -> usize {
-        let Scan {
-            range_min_m,
-            range_max_m,
-            ..
-        } = self.scan;
-        ((range_max_m - range_min_m) / self.sample_spacing_m() + 1e-9) as usize + 1
-    }
-
-    /// Distance between samples, c T_s/2, m.
-    pub fn sample_spacing_m(&self) -> f64 {
-        0.5 * crate::SPEED_OF_LIGHT_M_S / self.detector.sampling_hz
-    }
-
-    /// The 1/e half width sigma of |f|^2 in (7), s; for a sampled pulse that of the Gaussian with the same spread.
-    pub fn pulse_sigma_s(&self) -> f64 {
-        match &self.pulse.shape {
-            PulseShape::Sampled(_) => self
-                .pulse
-                .simulated()
-                .map_or(f64::NAN, |pulse| pulse.sigma_s()),
-            PulseShape::Gaussian(shape) => shape.duration().sigma_s(),
-        }
-    }
-
-    /// Full width at half maximum of the power of the pulse, s; of a sampled one that of the Gaussian with the same spread.
-    pub fn pulse_width_s(&self) -> f64 {
-        match &self.pulse.shape {
-            PulseShape::Gaussian(shape) if shape.definition == super::PulseDefinition::Fwhm => {
-                shape.duration_s
-            }
-            _ => 2.0 * std::f64::consts::LN_2.sqrt() * self.pulse_sigma_s(),
         }
     }
 }
@@ -158,13 +109,6 @@ impl Scene {
             radii,
             "below",
         );
-        if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
-            let keys = [
-                "atmosphere.turbulence.outer_scale_m",
-                "atmosphere.turbulence.inner_scale_m",
-            ];
-            c.compare(keys, [t.outer_scale_m, t.inner_scale_m], "above");
-        }
         if let Some(p) = self.flow.pair() {
             let (core_m, spacing_m) = (p.core_radius_m, p.spacing_m);
             let below = format!("below half of flow.spacing_m, {} m", 0.5 * spacing_m);
@@ -411,17 +355,20 @@ impl Scene {
     }
 }
 
-/// Lists of a table that belong together have the same length; the one that differs from the first is blamed.
-fn check_lengths(counts: &[(&str, usize)], table: &str, c: &mut Checker<'_>) {
-    let Some((first, count)) = counts.first() else {
-        return;
-    };
-    if let Some((key, other)) = counts.iter().find(|(_, other)| other != count) {
-        let allowed = format!("as many values as {first} has, {count}");
-        c.refuse(key, &format!("a list of {other}"), allowed);
-    }
-    if counts.iter().all(|(_, n)| *n == 0) {
-        c.refuse(table, "", "a table with at least one value in each list");
+/// Refuses what a library refuses of a table: the key of the field that it names, or else the table.
+fn refuse<T: Declared>(c: &mut Checker<'_>, table: &str, value: &T, error: Error) {
+    let keys = value.to_value();
+    let refused = error.refused_field().filter(|refused| {
+        let name = refused.name.split('[').next().unwrap_or_default();
+        keys.as_ref().is_some_and(|keys| keys.get(name).is_some())
+    });
+    match refused {
+        Some(refused) => c.refuse(
+            &format!("{table}.{}", refused.name),
+            &refused.value,
+            refused.allowed,
+        ),
+        None => c.refuse(table, "", error.to_string()),
     }
 }
 

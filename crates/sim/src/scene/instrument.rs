@@ -4,7 +4,6 @@
 
 use super::Scene;
 use crate::keys::{ABOVE_ZERO_OR_INF, Checker, Number, ZERO_OR_MORE, keys};
-use num_complex::Complex;
 use wakescope_optics::RadiusDefinition;
 use wakescope_optics::plan::Receiver as ReceiverPath;
 use wakescope_signal::sampled::SampledPulse;
@@ -224,11 +223,12 @@ impl SampledShape {
         let sampled = if self.phase_rad.is_empty() {
             SampledPulse::from_power(&self.time_s, &self.power, energy_j)?
         } else {
-            let mut envelope = Vec::with_capacity(self.power.len());
-            for (power, phase_rad) in self.power.iter().zip(&self.phase_rad) {
-                envelope.push(Complex::from_polar(power.sqrt(), *phase_rad));
-            }
-            SampledPulse::new(&self.time_s, &envelope, energy_j)?
+            SampledPulse::from_power_and_phase(
+                &self.time_s,
+                &self.power,
+                &self.phase_rad,
+                energy_j,
+            )?
         };
         Ok(if self.centred {
             sampled.centred().into()

@@ -3,7 +3,8 @@
 use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, idle};
 use crate::Error;
 use crate::document::{Content, Document};
-use crate::keys::{Format, Key, Text, keys_of, to_table, value_at};
+use crate::error::RefusedField;
+use crate::keys::{Format, Key, Text, join, keys_of, to_table, value_at};
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -110,15 +111,48 @@ impl SceneFile {
         self.with(scene)
     }
 
-    /// An error of a key with the line of the file that states it.
+    /// An error of a key, or of a field that a library refuses and one key alone states, with the
+    /// line of the file.
     pub(crate) fn of_key(&self, error: Error) -> Error {
-        let Error::Key { key, reason } = error else {
-            return error;
-        };
         let whole = toml::Value::Table(to_table(&self.content));
-        let value = value_at(&whole, key).filter(|value| !value.is_table());
-        let value = value.map(|value| value.to_string()).unwrap_or_default();
-        self.located(vec![Problem::new(key, value, reason)]).into()
+        let problem = match error {
+            Error::Key { key, reason } => {
+                let value = value_at(&whole, key).filter(|value| !value.is_table());
+                let value = value.map(ToString::to_string).unwrap_or_default();
+                Problem::new(key, value, reason)
+            }
+            error => {
+                let Some(refused) = error.refused_field() else {
+                    return error;
+                };
+                let mut keys = Vec::new();
+                add_keys_of(&refused, &whole, "", &mut keys);
+                let [key] = &keys[..] else {
+                    return error;
+                };
+                Problem::new(key, refused.value, refused.allowed)
+            }
+        };
+        self.located(vec![problem]).into()
+    }
+}
+
+/// Adds the keys of a table, and of those in it, that have the name and the value of a field.
+fn add_keys_of(field: &RefusedField, table: &toml::Value, path: &str, keys: &mut Vec<String>) {
+    let Some(table) = table.as_table() else {
+        return;
+    };
+    for (name, value) in table {
+        let key = join(path, name);
+        let number = match value {
+            toml::Value::Integer(whole) => Some(*whole as f64),
+            value => value.as_float(),
+        };
+        if *name == field.name && number.is_some_and(|x| format!("{x:?}") == field.value) {
+            keys.push(key);
+        } else {
+            add_keys_of(field, value, &key, keys);
+        }
     }
 }
 
@@ -383,5 +417,50 @@ mod tests {
             hash("[laser]\nwavelength_m = 1.55e-6 # as the default\n")
         );
         assert_ne!(hash(""), hash("seed = 2\n"));
+    }
+
+    #[test]
+    fn a_field_that_a_library_refuses_is_reported_with_the_line_of_its_key() {
+        let text = "[telescope]\nbeam_radius_m = 0.021\n";
+        let file = SceneFile::parse(text, Path::new("s.toml")).unwrap();
+        let refused = |field, value| {
+            let allowed = "smaller";
+            let error = wakescope_optics::Error::OutOfRange {
+                field,
+                value,
+                allowed,
+            };
+            file.of_key(error.into()).to_string()
+        };
+        assert_eq!(
+            refused("beam_radius_m", 0.021),
+            "s.toml:2: telescope.beam_radius_m = 0.021 is not allowed: smaller"
+        );
+        // No key has the value, or the name.
+        for (field, value) in [("beam_radius_m", 0.02), ("wave", 0.021)] {
+            assert!(refused(field, value).starts_with("optics: "));
+        }
+    }
+
+    #[test]
+    fn lists_that_a_library_refuses_are_reported_beside_all_other_problems() {
+        let text = "[scan]\nrealisations = 0\n[pulse.shape]\nkind = \"sampled\"\ntime_s = [0.0, 1e-7, 2e-7]\n\
+                    power = [0.0, 1.0]\n[atmosphere.profile]\nrange_m = [100.0, 50.0]\nbackscatter_per_m_sr = [1e-7, 1e-7]\n\
+                    extinction_per_m = [1e-5, 1e-5]\n[atmosphere.turbulence]\nkind = \"refractive\"\n\
+                    spectrum = \"hill_andrews\"\ninner_scale_m = 0.0\n";
+        let found = message(text);
+        let lines: Vec<&str> = found.lines().collect();
+        assert_eq!(lines.len(), 4, "{found}");
+        for (line, key) in [
+            "s.toml:2: scan.realisations = 0",
+            "s.toml:6: pulse.shape.power",
+            "s.toml:8: atmosphere.profile.range_m",
+            "s.toml:14: atmosphere.turbulence.inner_scale_m = 0.0",
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            assert!(lines[line].starts_with(key), "{found}");
+        }
     }
 }

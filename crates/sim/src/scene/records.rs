@@ -1,14 +1,46 @@
 //! The records of a scene in the terms of the estimators: sampling, windows, noise, and the
 //! autocorrelation of the pulse.
 
-use super::{DetectorSignal, NoiseModel, Scene, Weighting};
+use super::{DetectorSignal, NoiseModel, PulseDefinition, PulseShape, Scene, Weighting};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use num_complex::Complex;
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_2, TAU};
 use wakescope_estimate::bound::Noise;
 use wakescope_estimate::{self as estimate, Sampling, SignalKind};
 
 impl Scene {
+    /// Samples recorded of each pulse: from `range_min_m` to `range_max_m`, ends included.
+    pub fn samples_per_record(&self) -> usize {
+        let length_m = self.scan.range_max_m - self.scan.range_min_m;
+        (length_m / self.sample_spacing_m() + 1e-9) as usize + 1
+    }
+
+    /// Distance between samples, c T_s/2, m.
+    pub fn sample_spacing_m(&self) -> f64 {
+        0.5 * SPEED_OF_LIGHT_M_S / self.detector.sampling_hz
+    }
+
+    /// The 1/e half width sigma of |f|^2 in (7), s; for a sampled pulse that of the Gaussian with the same spread.
+    pub fn pulse_sigma_s(&self) -> f64 {
+        match &self.pulse.shape {
+            PulseShape::Sampled(_) => self
+                .pulse
+                .simulated()
+                .map_or(f64::NAN, |pulse| pulse.sigma_s()),
+            PulseShape::Gaussian(shape) => shape.duration().sigma_s(),
+        }
+    }
+
+    /// Full width at half maximum of the power of the pulse, s; of a sampled one that of the Gaussian with the same spread.
+    pub fn pulse_width_s(&self) -> f64 {
+        match &self.pulse.shape {
+            PulseShape::Gaussian(shape) if shape.definition == PulseDefinition::Fwhm => {
+                shape.duration_s
+            }
+            _ => 2.0 * LN_2.sqrt() * self.pulse_sigma_s(),
+        }
+    }
+
     /// Sampling of the records.
     ///
     /// # Errors
