@@ -1,4 +1,4 @@
-//! Points of a table: evenly linspace ones, and what lies between them.
+//! Points of a table: evenly spaced ones, and what lies between them.
 //!
 //! Check: wherever they are used; ends and straight lines.
 

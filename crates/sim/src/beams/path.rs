@@ -157,7 +157,7 @@ pub fn ppi(
     })
 }
 
-/// One turn of evenly linspace beams on a cone.
+/// One turn of evenly spaced beams on a cone.
 pub fn vad(elevation_rad: f64, beams: usize) -> Vec<Stop> {
     let of_turn = |k: usize| {
         Stop::new(

@@ -74,7 +74,7 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
         path: field.path.clone(),
         reason,
     };
-    // The period that the file states, or of evenly linspace nodes; faces and centres have the same.
+    // The period that the file states, or of evenly spaced nodes; faces and centres have the same.
     let along = |direction: usize, periodic: bool| -> Result<Edges, Error> {
         let nodes_m = &components[direction].nodes_m[direction];
         let (Some(first), Some(second), Some(last)) =
