@@ -11,6 +11,7 @@ mod jacobi;
 mod lapack;
 #[cfg(feature = "openblas-system")]
 mod openblas;
+pub(crate) mod positive_definite;
 
 use ndarray::{Array1, Array2, ArrayView2, ShapeBuilder};
 use ndarray_linalg::{Eigh, Lapack, Scalar, UPLO};

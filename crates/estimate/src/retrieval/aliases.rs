@@ -8,12 +8,12 @@
 use ndarray::Array2;
 
 use crate::error::Error;
-use crate::retrieval::hypotheses::{End, HOPELESS, Kind, ROUGH, Stage, least};
-use crate::retrieval::report::COMPETES;
+use crate::linalg::positive_definite::solve;
+use crate::retrieval::hypotheses::{End, Kind, Stage, least};
 use crate::retrieval::{Movement, RetrievalOptions, ScanMap};
-use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::SEARCHED;
+use crate::vortex_fit::tolerances::{COMPETES, HOPELESS, MINIMUM};
 use crate::vortex_fit::{Parameter, Wake};
 
 /// Fastest wind that is tried \[m/s\]: no aircraft lands in a faster cross wind by far.
@@ -133,7 +133,7 @@ fn in_aliases(stage: &Stage<'_>, end: &End, scale: f64) -> Vec<End> {
             ..end.wake
         };
         if is_allowed(&start) {
-            found.extend(stage.lowest(end.kind, &start, end.groups.clone(), ROUGH));
+            found.extend(stage.lowest(end.kind, &start, end.groups.clone(), MINIMUM));
         }
     }
     found.retain(|found| found.chi2 <= most);

@@ -9,11 +9,12 @@ use ndarray::Array2;
 
 use crate::Measured;
 use crate::error::Error;
-use crate::retrieval::hypotheses::{AS_IT_IS, End, Kind, ROUGH, Stage, best};
-use crate::retrieval::report::{COMPETES, Chosen, Report};
+use crate::retrieval::hypotheses::{End, Kind, Stage, best};
+use crate::retrieval::report::{Chosen, Report};
 use crate::retrieval::{Flag, ScanResult, VortexResult};
-use crate::vortex_fit::damped_newton::Stop;
 use crate::vortex_fit::map_fit::gates::Gates;
+use crate::vortex_fit::tolerances::{COMPETES, EVALUATION, MINIMUM, NEGLIGIBLE, SPACING};
+use crate::vortex_fit::top::mixed;
 use crate::vortex_fit::{Parameter, Vortex, Wake};
 
 /// Spacings of the pairs behind aircraft in service \[m\]: pi/4 of spans of 20 to 80 m, one as likely as another in its logarithm.
@@ -21,14 +22,6 @@ const SPACINGS_M: (f64, f64) = (16.0, 63.0);
 const SPACINGS: usize = 12;
 /// Spacings are others if their logarithms differ by more.
 const APART: f64 = 0.1;
-/// What is so much above the best chi-square, in variances, has no weight; nor has what lies beyond it.
-const NEGLIGIBLE: f64 = 30.0;
-/// A fit with a given spacing ends at such a step: its deviations are small against the distance of spacings.
-const WEIGHED: Stop = Stop {
-    iterations: 40,
-    sigmas: 0.1,
-    learns: false,
-};
 
 struct Alternative {
     end: End,
@@ -99,7 +92,10 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
     } else {
         end
     };
-    let mut result = report.told(told, mixed(&all, &told.wake), statistic);
+    let weighted = all
+        .iter()
+        .map(|one| (one.weight, &one.end.wake, &one.covariance));
+    let mut result = report.told(told, mixed(weighted, &told.wake), statistic);
     result
         .vortices
         .iter_mut()
@@ -155,7 +151,7 @@ fn other_spacings(report: &Report<'_>, end: &End, most: f64) -> Vec<End> {
                 end.kind,
                 &with_spacing(&near, *spacing_m),
                 groups.clone(),
-                WEIGHED,
+                SPACING,
             ) else {
                 continue;
             };
@@ -207,9 +203,9 @@ fn of_other_profile(
         ..report.stage.clone()
     }
     .through(&dense);
-    let near = stage.onwards(std::slice::from_ref(end), |_| ROUGH);
+    let near = stage.onwards(std::slice::from_ref(end), |_| MINIMUM);
     let stage = stage.through(&fine);
-    let other = stage.onwards(&near, |_| AS_IT_IS).pop();
+    let other = stage.onwards(&near, |_| EVALUATION).pop();
     let other = other.filter(|other| other.chi2 <= most);
     let report = Report {
         stage: &stage,
@@ -228,26 +224,6 @@ fn nearest_to_the_mean_spacing(all: &[Alternative]) -> &End {
         .min_by(|a, b| away(a).total_cmp(&away(b)))
         .unwrap_or(0)]
     .end
-}
-
-/// Mean squares of the distances from a wake: covariances of all and between them.
-fn mixed(all: &[Alternative], wake: &Wake) -> Array2<f64> {
-    let own = wake.to_array();
-    let mut mixed = Array2::zeros((own.len(), own.len()));
-    for one in all {
-        let other = one.end.wake.to_array();
-        let away = |i: usize| {
-            if one.covariance[[i, i]] > 0.0 {
-                other[i] - own[i]
-            } else {
-                0.0
-            }
-        };
-        mixed.indexed_iter_mut().for_each(|((i, j), c)| {
-            *c += one.weight * (one.covariance[[i, j]] + away(i) * away(j));
-        });
-    }
-    mixed
 }
 
 /// Deviations of a vortex become those of all that the scan allows, each at its own line and with its own profile.

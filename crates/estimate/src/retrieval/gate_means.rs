@@ -7,13 +7,14 @@
 use crate::error::Error;
 use crate::retrieval::aliases::{self, CALM, Unfolded};
 use crate::retrieval::alternatives::with_alternatives;
-use crate::retrieval::hypotheses::{End, Kind, ROUGH, Stage, least, rivals};
+use crate::retrieval::hypotheses::{End, Kind, Stage, least, rivals};
 use crate::retrieval::report::{OUTLIER, Report};
 use crate::retrieval::whitening::Whitening;
 use crate::retrieval::{Flag, Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
 use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::SEARCHED;
+use crate::vortex_fit::tolerances::MINIMUM;
 use crate::vortex_fit::{Loss, Wake};
 
 /// Most velocities that are whitened, and that are fitted: blocks stand for more.
@@ -110,7 +111,7 @@ fn finished(
     let dense = Gates::on_grid(map, options, 1)?;
     let frozen = dense.clone().frozen();
     let stage = all.through(&dense);
-    let mut ends = stage.onwards(rough, |_| ROUGH);
+    let mut ends = stage.onwards(rough, |_| MINIMUM);
     let may_stand = options.movement == Movement::Auto && dense.seconds.is_some();
     let still = stage.clone().through(&frozen);
     let standing = if may_stand {
@@ -119,7 +120,7 @@ fn finished(
         None
     };
     let at_rest = if map.fold_m_s.is_some() && may_stand {
-        still.onwards(&ends, |_| ROUGH)
+        still.onwards(&ends, |_| MINIMUM)
     } else {
         Vec::new()
     };
@@ -186,7 +187,7 @@ fn ends_at_rest(
 ) -> Option<Vec<End>> {
     let likely = least(ends, moving.squares.cells.len())?;
     let end = still
-        .onwards(std::slice::from_ref(likely), |_| ROUGH)
+        .onwards(std::slice::from_ref(likely), |_| MINIMUM)
         .pop()?;
     let sense = if moving.map.lasts_s() < RetrievalOptions::SHORT_S {
         -1.0
@@ -194,7 +195,7 @@ fn ends_at_rest(
         1.0
     };
     let margin = RetrievalOptions::MOVES * scale.powi(2) * sense;
-    (end.chi2 + margin < likely.chi2).then(|| still.onwards(ends, |_| ROUGH))
+    (end.chi2 + margin < likely.chi2).then(|| still.onwards(ends, |_| MINIMUM))
 }
 
 /// A stage with deviations or a loss of the scale of the residuals that a likely end leaves, and that scale over the stated deviations.

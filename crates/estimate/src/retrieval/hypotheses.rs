@@ -3,14 +3,19 @@
 //! Check: the reference maps; wakes of which one vortex is in view.
 
 use crate::error::Error;
+use crate::linalg::positive_definite::inverse;
 use crate::retrieval::{RetrievalOptions, ScanMap, Side};
-use crate::vortex_fit::damped_newton::{Minimum, Stop, inverse};
+use crate::vortex_fit::levenberg_marquardt::{Minimum, StoppingRule};
 use crate::vortex_fit::map_fit::cells::{cells, products};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::Search;
 use crate::vortex_fit::map_fit::least_squares::LeastSquares;
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
-use crate::vortex_fit::top::{SAME_SIGMAS, distinct};
+use crate::vortex_fit::tolerances::{
+    EVALUATION, HOPELESS, MINIMUM, NEARLY_SAME_FRACTION, REPORTED, ROUGHLY_SAME_FRACTION,
+    SAME_FRACTION, SAME_SIGMAS, SEARCH,
+};
+use crate::vortex_fit::top::distinct;
 use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{PARAMETERS, Parameter, Vortex, Wake};
 
@@ -22,35 +27,6 @@ const BROAD: f64 = 0.1;
 /// A core is not resolved if its deviation is more than this part of it, or if it is more than that part of the spacing.
 const RESOLVED: f64 = 0.5;
 const LARGEST: f64 = 0.5;
-/// So near they are one even where there is no noise.
-const SAME: f64 = 1e-4;
-
-/// Where ends of rough fits are one, and wakes with broad cores: this part of a parameter, of 20 at least.
-const ROUGHLY: f64 = 1e-3;
-const NEARLY: f64 = 5e-3;
-/// A rough end so much above the best of its kind competes no longer.
-pub(crate) const HOPELESS: f64 = 50.0;
-
-const FAR: Stop = Stop {
-    iterations: 25,
-    sigmas: 0.3,
-    learns: false,
-};
-pub(crate) const ROUGH: Stop = Stop {
-    iterations: 40,
-    sigmas: 1e-2,
-    learns: false,
-};
-const FINE: Stop = Stop {
-    iterations: 50,
-    sigmas: 1e-4,
-    learns: false,
-};
-pub(crate) const AS_IT_IS: Stop = Stop {
-    iterations: 1,
-    sigmas: f64::INFINITY,
-    learns: false,
-};
 
 /// Which vortices there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -235,7 +211,7 @@ impl<'a> Stage<'a> {
             Kind::Wind,
             &Kind::Wind.of(about),
             self.groups(Kind::Wind),
-            ROUGH,
+            MINIMUM,
         )
         .ok_or(nowhere)
     }
@@ -246,7 +222,7 @@ impl<'a> Stage<'a> {
         kind: Kind,
         start: &Wake,
         groups: Vec<Vec<usize>>,
-        stop: Stop,
+        stop: StoppingRule,
     ) -> Option<End> {
         let Minimum {
             at,
@@ -287,7 +263,8 @@ impl<'a> Stage<'a> {
             LONE_CORE_M / CORE_OVER_SPACING
         };
         let broad = self.options.free.start(start).with_cores(BROAD * spacing_m);
-        self.lowest(kind, &broad, coreless, FAR).map(|end| end.wake)
+        self.lowest(kind, &broad, coreless, SEARCH)
+            .map(|end| end.wake)
     }
 
     /// From a start near the end, with cores begun anew.
@@ -295,13 +272,13 @@ impl<'a> Stage<'a> {
         let mut groups = self.groups(kind);
         let core_m = self.core_m(kind, near);
         if !groups.iter().any(|group| is_core(group)) {
-            let end = self.lowest(kind, &near.with_cores(core_m), groups.clone(), ROUGH)?;
+            let end = self.lowest(kind, &near.with_cores(core_m), groups.clone(), MINIMUM)?;
             // the typical core is that of the spacing which the fit ends with
             return self.lowest(
                 kind,
                 &end.wake.with_cores(self.core_m(kind, &end.wake)),
                 groups,
-                ROUGH,
+                MINIMUM,
             );
         }
         let spacing_m = if kind == Kind::Both {
@@ -309,7 +286,7 @@ impl<'a> Stage<'a> {
         } else {
             LONE_CORE_M / CORE_OVER_SPACING
         };
-        let end = self.lowest(kind, &near.with_cores(core_m), groups.clone(), ROUGH);
+        let end = self.lowest(kind, &near.with_cores(core_m), groups.clone(), MINIMUM);
         let vague: Vec<usize> = match &end {
             Some(end) => self.vague_cores(end, LARGEST * spacing_m),
             None => vec![Parameter::LeftCore as usize, Parameter::RightCore as usize],
@@ -326,7 +303,7 @@ impl<'a> Stage<'a> {
                 .filter(|place| is_core(&[*place]) && !vague.contains(place))
                 .for_each(|i| p[i] = found[i]);
         }
-        self.lowest(kind, &Wake::from_array(&p), groups, ROUGH)
+        self.lowest(kind, &Wake::from_array(&p), groups, MINIMUM)
     }
 
     /// Places of the core radii that the scan does not resolve.
@@ -360,7 +337,7 @@ impl<'a> Stage<'a> {
             .iter()
             .filter_map(|(kind, start)| Some((*kind, self.near(*kind, start)?)));
         let nears = distinct(nears, |(other, wake), (kind, near)| {
-            other == kind && kind.same(wake, near, NEARLY)
+            other == kind && kind.same(wake, near, NEARLY_SAME_FRACTION)
         });
         let mut ends: Vec<End> = nears
             .iter()
@@ -377,7 +354,7 @@ impl<'a> Stage<'a> {
     }
 
     /// The ends for another problem, such as another scale of the loss.
-    pub(crate) fn onwards(&self, ends: &[End], stop: impl Fn(&End) -> Stop) -> Vec<End> {
+    pub(crate) fn onwards(&self, ends: &[End], stop: impl Fn(&End) -> StoppingRule) -> Vec<End> {
         ends.iter()
             .filter_map(|end| self.lowest(end.kind, &end.wake, end.groups.clone(), stop(end)))
             .collect()
@@ -388,9 +365,9 @@ impl<'a> Stage<'a> {
         let likely = least(ends, self.squares.cells.len()).map(|likely| likely.chi2);
         self.onwards(ends, |end| {
             if Some(end.chi2) == likely {
-                FINE
+                REPORTED
             } else {
-                AS_IT_IS
+                EVALUATION
             }
         })
     }
@@ -409,7 +386,7 @@ pub(crate) fn rivals(ends: &[End], scale: f64) -> Vec<End> {
         best(ends, end.kind).is_none_or(|best| end.chi2 > best.chi2 + HOPELESS * scale * scale)
     };
     let same = |other: &End, end: &End| {
-        other.kind == end.kind && end.kind.same(&end.wake, &other.wake, ROUGHLY)
+        other.kind == end.kind && end.kind.same(&end.wake, &other.wake, ROUGHLY_SAME_FRACTION)
     };
     distinct(ends.iter().filter(|end| !hopeless(end)).cloned(), same)
 }
@@ -452,7 +429,7 @@ pub(crate) fn tops<'a>(
         let (a, b) = (end.wake.to_array(), top.wake.to_array());
         let near = |i: usize| {
             let sigma = covariance[[i, i]].sqrt();
-            (a[i] - b[i]).abs() <= (SAME_SIGMAS * sigma).max(SAME * a[i].abs().max(1.0))
+            (a[i] - b[i]).abs() <= (SAME_SIGMAS * sigma).max(SAME_FRACTION * a[i].abs().max(1.0))
         };
         (0..PARAMETERS).all(|i| near(i) || !end.kind.has(i))
     })

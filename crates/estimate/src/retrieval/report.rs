@@ -6,10 +6,11 @@ use ndarray::{Array1, Array2, Axis};
 
 use crate::Measured;
 use crate::error::Error;
+use crate::linalg::positive_definite::solve;
 use crate::retrieval::hypotheses::{End, Kind, Stage, best, least, tops};
 use crate::retrieval::{Covariance, Flag, ScanResult, Side, VortexResult};
-use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::map_fit::least_squares::{Scores, Uncertainty};
+use crate::vortex_fit::tolerances::{COMPETES, NOT_CONVERGED_SIGMAS};
 use crate::vortex_fit::{Parameter, Top, Wake};
 
 /// Velocities with larger residuals, in their deviations, are outliers.
@@ -18,15 +19,11 @@ pub(crate) const OUTLIER: f64 = 4.0;
 pub(crate) const CERTAIN_SIGMAS: f64 = 3.0;
 /// So many times the root of the threshold is far beyond doubt in correlated noise too.
 const BY_FAR: f64 = 2.0;
-/// A top so much above the least chi-square competes with it.
-pub(crate) const COMPETES: f64 = 9.0;
 /// A side of a vortex is seen if the sector reaches so far beyond its centre \[m\], where circulation begins to be counted.
 const SEEN_M: f64 = 5.0;
 /// Chi-square per degree after robust scaling that is too much, and part of outliers that is.
 const POOR: f64 = 2.0;
 const MANY_OUTLIERS: f64 = 0.1;
-/// A fit has come to its end if the step that is left is less than this part of its deviations.
-const AT_END: f64 = 0.1;
 /// Blocks of a map that tell how its residuals are correlated: more are no better for wakes, and take longer.
 const BLOCKS: usize = 2000;
 
@@ -204,7 +201,7 @@ impl<'a> Report<'a> {
                     > MANY_OUTLIERS * (self.stage.rejected + residuals.len()) as f64,
             ),
             (Flag::Thinned, self.stage.thinned),
-            (Flag::NotConverged, end.sigmas_left > AT_END),
+            (Flag::NotConverged, end.sigmas_left > NOT_CONVERGED_SIGMAS),
         ];
         ScanResult {
             wake: (!vortices.is_empty()).then_some(end.wake),

@@ -4,7 +4,8 @@ use ndarray::Array2;
 
 use crate::Measured;
 use crate::retrieval::ScanMap;
-use crate::retrieval::report::{CERTAIN_SIGMAS, COMPETES};
+use crate::retrieval::report::CERTAIN_SIGMAS;
+use crate::vortex_fit::tolerances::COMPETES;
 use crate::vortex_fit::wake::motion::Motion;
 use crate::vortex_fit::{PARAMETERS, Parameter, Top, Wake, WakeModel};
 

@@ -10,8 +10,8 @@ use ndarray::{Array1, Array2};
 
 use crate::Measured;
 use crate::error::{Error, finite, increasing, not_empty, positive};
+use crate::linalg::positive_definite::inverse;
 use crate::retrieval::{ScanResult, Side, VortexResult};
-use crate::vortex_fit::damped_newton::inverse;
 use crate::vortex_fit::{Vortex, Wake};
 
 /// Numbers of one vortex and of both.

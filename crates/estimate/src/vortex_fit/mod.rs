@@ -6,7 +6,8 @@
 //! | `map_fit` | `data`, `cells`: the map; `prediction`: what is expected of it, by `gates` at rest or in motion or by an estimator (`estimator_response`); `least_squares`: what is minimised and what is known at the minimum; `residual_covariance`; `setting`: both ways to the minimum; `guess`, `starts`, `estimates`: fits of our own maps; `secondary`: four vortices; `local_circulation`: what is near each vortex |
 //! | `signal_fit` | `baseband`, `scan_model`: signals at the rate of the detector band, lines cut into layers; `line_covariance`, `banded_cholesky`, `likelihood`: covariance of a line, its factor and derivatives, Fisher information; `fit`, `ascent`, `tops`: the fit and the tops of its likelihood |
 //! | `top` | the ends of fits from several starts |
-//! | `damped_newton` | the iteration of Levenberg and Marquardt that both fits share |
+//! | `levenberg_marquardt` | the iteration that both fits share |
+//! | `tolerances` | when each pass of a fit stops, and which of its minima are compared, in one table |
 //!
 //! A map is fitted first, without prior knowledge ([`fit_map_of_estimator`]; [`fit_map`] if its velocities are means
 //! over gates); its outcome starts the fit of the signals ([`fit_signals`]). The bound on any unbiased fit of the
@@ -31,9 +32,10 @@
 //! To measure again: `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
 //! (signals) or `circulation_from_many_maps` (maps).
 
-pub(crate) mod damped_newton;
+pub(crate) mod levenberg_marquardt;
 pub(crate) mod map_fit;
 mod signal_fit;
+pub(crate) mod tolerances;
 pub(crate) mod top;
 pub(crate) mod wake;
 

@@ -4,9 +4,6 @@ use ndarray::Array2;
 
 use crate::vortex_fit::{PARAMETERS, Wake};
 
-/// Tops closer than this many standard deviations are one.
-pub(crate) const SAME_SIGMAS: f64 = 0.3;
-
 /// Those that are not the same as one before them.
 pub(crate) fn distinct<T>(
     all: impl IntoIterator<Item = T>,
@@ -21,16 +18,26 @@ pub(crate) fn distinct<T>(
     kept
 }
 
-/// Covariance \[10, 10\] about a wake of tops with their weights: what is known within each of them, and the distances between them.
+/// Covariance \[10, 10\] about a wake of tops with their weights: what is known within each of them, and the distances between them in all parameters
+/// that were fitted.
 pub(crate) fn mixed<'t>(
     tops: impl Iterator<Item = (f64, &'t Wake, &'t Array2<f64>)>,
     about: &Wake,
 ) -> Array2<f64> {
-    let (mut mixed, mut weights) = (Array2::zeros((PARAMETERS, PARAMETERS)), 0.0);
+    let about = about.to_array();
+    let mut mixed = Array2::zeros((PARAMETERS, PARAMETERS));
+    let mut weights = 0.0;
     for (weight, wake, within) in tops {
-        let (a, b) = (wake.to_array(), about.to_array());
+        let mut distance = wake.to_array();
+        for i in 0..PARAMETERS {
+            distance[i] = if within[[i, i]] > 0.0 {
+                distance[i] - about[i]
+            } else {
+                0.0
+            };
+        }
         for ((i, j), c) in mixed.indexed_iter_mut() {
-            *c += weight * (within[[i, j]] + (a[i] - b[i]) * (a[j] - b[j]));
+            *c += weight * (within[[i, j]] + distance[i] * distance[j]);
         }
         weights += weight;
     }

@@ -11,9 +11,9 @@ use ndarray::{Array1, Array2, ArrayView1, s};
 
 use crate::error::{Error, enough_velocities, increasing, not_empty, positive};
 use crate::linalg::cholesky::cholesky;
+use crate::linalg::positive_definite::solve;
 use crate::matched_filter::{Background, Cells, MatchedFilter, wind_velocities};
 use crate::retrieval::{Gate, ScanMap};
-use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use crate::wake_detection::bank::{Bank, DetectorOptions, Template};
 

@@ -8,7 +8,7 @@
 use ndarray::Array2;
 
 use crate::error::Error;
-use crate::vortex_fit::damped_newton::Stop;
+use crate::vortex_fit::levenberg_marquardt::StoppingRule;
 use crate::vortex_fit::map_fit::coarse::Coarse;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
 use crate::vortex_fit::map_fit::gates::Gates;
@@ -17,6 +17,9 @@ use crate::vortex_fit::map_fit::local_circulation::{REACH_M, joined};
 use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, near, quotients};
 use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::map_fit::starts::{best_of, rivals, starts, with_typical_core};
+use crate::vortex_fit::tolerances::{
+    COARSE_ESTIMATES, ESTIMATES, MEANS, MEANS_START, SHORT_ESTIMATES,
+};
 use crate::vortex_fit::top::distinct;
 use crate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, SecondaryVortices,
@@ -25,27 +28,6 @@ use crate::vortex_fit::{
 
 /// The least core radius over a region's radius, or over the distance of lines.
 const SMALLEST_CORE: f64 = 0.25;
-/// Fits end at a step of this many standard deviations at the latest, with neighbours that are alike counted once: estimators
-/// round.
-const NEAR: Stop = Stop {
-    iterations: 40,
-    sigmas: 0.03,
-    learns: false,
-};
-/// Fits that only lead to a start may end at such a step, and fits of means for themselves.
-const ROUGH_SIGMAS: f64 = 0.1;
-const FINE_SIGMAS: f64 = 0.01;
-/// So may those to few places, which all places correct at once.
-const COARSE: Stop = Stop {
-    iterations: 40,
-    sigmas: 0.5,
-    learns: false,
-};
-/// And those to all places from one of several starts; what takes longer is on its way to where another start is nearer, or nowhere.
-const SHORT: Stop = Stop {
-    iterations: 12,
-    ..COARSE
-};
 /// Places that tell nearly all of a map: no farther apart than this part of the radius of its regions, for starts and for slopes (half the
 /// radius for these saves a tenth of the time, but heights scatter by some per cent more), and of the width of its gates.
 const LINES_OVER_RADIUS: [f64; 2] = [0.8, 0.3];
@@ -75,7 +57,7 @@ pub fn fit_map(
         options,
         least_core_m: 0.0,
     };
-    let refine = |start: &Wake| setting.descended(start, FINE_SIGMAS);
+    let refine = |start: &Wake| setting.descended(start, MEANS);
     with_typical_core(best_of(&starts(guess, options), refine)?, options, refine)?
         .standing_out(options.least_statistic)
 }
@@ -103,7 +85,7 @@ pub fn fit_map_of_estimator(
     };
     let for_slopes = all.coarse(LINES_OVER_RADIUS[1]);
     let all = all.with_slopes_at(for_slopes.as_ref())?;
-    let refine = |start: &Wake| all.setting().refined(start, NEAR);
+    let refine = |start: &Wake| all.setting().refined(start, ESTIMATES);
     let from = |about: &[Wake]| {
         let starts: Vec<Wake> = about
             .iter()
@@ -111,8 +93,8 @@ pub fn fit_map_of_estimator(
             .collect();
         // where a map cannot be thinned its own rough ends tell which starts lead to one end, and which nowhere
         let ends = match &few {
-            Some(few) => few.ends(&starts, COARSE),
-            None if starts.len() > 1 => all.ends(&starts, SHORT),
+            Some(few) => few.ends(&starts, COARSE_ESTIMATES),
+            None if starts.len() > 1 => all.ends(&starts, SHORT_ESTIMATES),
             None => Vec::new(),
         };
         best_of(if ends.is_empty() { &starts } else { &ends }, refine)
@@ -141,7 +123,7 @@ pub fn refine_map_fit_of_estimator(
     let for_slopes = all.coarse(LINES_OVER_RADIUS[1]);
     all.with_slopes_at(for_slopes.as_ref())?
         .setting()
-        .refined(guess, NEAR)
+        .refined(guess, ESTIMATES)
 }
 
 /// Secondary vortices beside the pair of a fit, if the map shows them or the options want them anyway, and that pair with them: both are fitted at
@@ -205,7 +187,9 @@ pub fn with_local_circulations(
                 < REACH_M
         });
         let shown = Shown::new(&near.map(), model, response, options, 1.0).ok()?;
-        shown.setting().local_circulation(&pair.wake, side, NEAR)
+        shown
+            .setting()
+            .local_circulation(&pair.wake, side, ESTIMATES)
     });
     Ok(joined(pair, &local))
 }
@@ -323,7 +307,7 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
         };
         let mut ends = Vec::new();
         for guess in guesses {
-            let end = setting.descended(guess, ROUGH_SIGMAS).ok();
+            let end = setting.descended(guess, MEANS_START).ok();
             let end = end.map(|fit| fit.wake);
             ends.extend(end);
             let is_in_map = |vortex: &Vortex| model.sees(sector, vortex.place_m());
@@ -335,7 +319,7 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
     }
 
     /// Where the fits from some starts end that do, without those that are one.
-    fn ends(&self, starts: &[Wake], stop: Stop) -> Vec<Wake> {
+    fn ends(&self, starts: &[Wake], stop: StoppingRule) -> Vec<Wake> {
         let refine = |start: &Wake| self.setting().refined(start, stop);
         let end = |start: &Wake| with_typical_core(refine(start)?, &self.options, refine);
         rivals(starts.iter().filter_map(|start| end(start).ok()).collect())

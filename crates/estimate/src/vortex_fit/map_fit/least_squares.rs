@@ -12,9 +12,10 @@ use ndarray::{Array2, Axis};
 
 use crate::error::Error;
 use crate::linalg::dot;
+use crate::linalg::positive_definite::{inverse, singular, solve};
 use crate::parallel::map_each;
 use crate::retrieval::Whitening;
-use crate::vortex_fit::damped_newton::{Minimum, Normal, Stop, inverse, lowest, singular, solve};
+use crate::vortex_fit::levenberg_marquardt::{Minimum, Normal, StoppingRule, levenberg_marquardt};
 use crate::vortex_fit::map_fit::cells::{Cell, products, scaled};
 use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::map_fit::prediction::Prediction;
@@ -163,9 +164,9 @@ impl LeastSquares<'_> {
         &self,
         start: &[f64],
         groups: &[Vec<usize>],
-        stop: Stop,
+        stop: StoppingRule,
     ) -> Option<Minimum<Vec<f64>>> {
-        lowest(
+        levenberg_marquardt(
             start.to_vec(),
             stop,
             |p| self.normal(p, groups),
@@ -179,7 +180,7 @@ impl LeastSquares<'_> {
         &self,
         start: &[f64],
         groups: &[Vec<usize>],
-        stop: Stop,
+        stop: StoppingRule,
     ) -> Result<Vec<f64>, Error> {
         let mut p = start.to_vec();
         for _ in 0..stop.iterations {

@@ -5,7 +5,7 @@
 //! to the velocities about it, in a wind of its own, with all else as the pair has it. Where that explains them no better the pair stands, which
 //! takes from the whole map what these fits take from a part. Check: pairs in winds that differ; simulated wakes.
 
-use crate::vortex_fit::damped_newton::Stop;
+use crate::vortex_fit::levenberg_marquardt::StoppingRule;
 use crate::vortex_fit::map_fit::least_squares::Scores;
 use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::{MapFit, Parameter, Sharing, Wake};
@@ -28,7 +28,12 @@ pub(crate) struct Local {
 impl Setting<'_, '_> {
     /// That of one vortex from this map, which holds what is near it alone; nothing where that is too little, turns
     /// the other way round, or the fit comes to no end.
-    pub(crate) fn local_circulation(&self, pair: &Wake, side: usize, stop: Stop) -> Option<Local> {
+    pub(crate) fn local_circulation(
+        &self,
+        pair: &Wake,
+        side: usize,
+        stop: StoppingRule,
+    ) -> Option<Local> {
         if self.options.free.circulation != Sharing::Separate {
             return None;
         }

@@ -9,11 +9,12 @@
 use ndarray::{Array1, Array2};
 use std::ops::Range;
 
-use crate::vortex_fit::damped_newton::{Stop, inverse};
+use crate::linalg::positive_definite::inverse;
 use crate::vortex_fit::map_fit::cells::{products, scaled};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::Scores;
 use crate::vortex_fit::map_fit::setting::{Linear, Setting};
+use crate::vortex_fit::tolerances::SECONDARY;
 use crate::vortex_fit::wake::core_prior::{KNOWN_CORE, secondary_ratios};
 use crate::vortex_fit::wake::pair::SECONDARY_PARAMETERS;
 use crate::vortex_fit::{PARAMETERS, Secondary, Vortex, Wake, WakeModel};
@@ -29,12 +30,6 @@ const GRID_OVER_HEIGHT: f64 = 0.12;
 const LEAST_GAIN: f64 = 20.0;
 /// Numbers of the secondary vortices that are fitted.
 const NUMBERS: usize = 2 * SECONDARY_PARAMETERS;
-/// The end of a fit of four; of those that are there it takes five to ten steps.
-const NEAR: Stop = Stop {
-    iterations: 15,
-    sigmas: 0.3,
-    learns: false,
-};
 
 /// Secondary vortices, of the left and of the right vortex, that were found beside a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,7 +105,9 @@ impl Setting<'_, '_> {
             .chain(secondary.iter().flat_map(numbers))
             .collect();
         groups.extend((PARAMETERS..PARAMETERS + NUMBERS).map(|place| vec![place]));
-        let mut settled = self.settled(start, &groups, NEAR, Some(counted)).ok()?;
+        let mut settled = self
+            .settled(start, &groups, SECONDARY, Some(counted))
+            .ok()?;
         // what two vortices miss looks like noise that neighbours share: what four leave tells how many velocities count as one
         settled.counted = self
             .about(&settled)

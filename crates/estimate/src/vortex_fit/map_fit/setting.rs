@@ -9,27 +9,19 @@
 use ndarray::{Array1, Array2};
 
 use crate::error::{Error, enough_velocities, finite};
-use crate::vortex_fit::damped_newton::{Stop, averaged, converged, halved};
+use crate::vortex_fit::levenberg_marquardt::{StoppingRule, converged};
 use crate::vortex_fit::map_fit::cells::{Cell, cells};
 use crate::vortex_fit::map_fit::data::{median, robust_scale};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Scores};
 use crate::vortex_fit::map_fit::prediction::{Prediction, Tangent, near};
+use crate::vortex_fit::tolerances::{ALMOST_CONVERGED_SIGMAS, MEANS};
 use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{
     CorePrior, MapFit, MapFitOptions, PairPrior, Parameter, RangeKernel, Top, VelocityMap, Wake,
     WakeModel,
 };
 
-/// Most evaluations in a descent, and the step that is left at its end \[standard deviations\].
-const DESCENT: Stop = Stop {
-    iterations: 200,
-    sigmas: 1e-2,
-    learns: false,
-};
-/// Peaks that jump keep a fit from its end: it ends where so much is left of a step after all iterations, in deviations, which it makes larger by an
-/// eighth at most.
-const ALMOST_SIGMAS: f64 = 0.5;
 /// The scale of residuals from means is taken anew this often.
 const ROUNDS: usize = 5;
 
@@ -122,9 +114,8 @@ impl Setting<'_, '_> {
         (of(better) - of(than)) / counted
     }
 
-    /// The fit by descent from a start on, to steps of `sigmas`.
-    pub(crate) fn descended(&self, start: &Wake, sigmas: f64) -> Result<MapFit, Error> {
-        let stop = Stop { sigmas, ..DESCENT };
+    /// The fit by descent from a start on.
+    pub(crate) fn descended(&self, start: &Wake, stop: StoppingRule) -> Result<MapFit, Error> {
         let mut groups = self.groups(start)?;
         let coreless: Vec<Vec<usize>> = groups
             .iter()
@@ -155,7 +146,7 @@ impl Setting<'_, '_> {
     }
 
     /// The fit by steps of Gauss and Newton from a start on, with neighbours that are alike counted once.
-    pub(crate) fn refined(&self, start: &Wake, stop: Stop) -> Result<MapFit, Error> {
+    pub(crate) fn refined(&self, start: &Wake, stop: StoppingRule) -> Result<MapFit, Error> {
         let groups = self.groups(start)?;
         let start = self.options.free.start(start).to_array().to_vec();
         let linear = self.settled(start, &groups, stop, None)?;
@@ -172,7 +163,7 @@ impl Setting<'_, '_> {
         &self,
         mut p: Vec<f64>,
         all: &[Vec<usize>],
-        stop: Stop,
+        stop: StoppingRule,
         counted: Option<f64>,
     ) -> Result<Linear, Error> {
         let (mut groups, mut released) = (all.to_vec(), false);
@@ -198,7 +189,7 @@ impl Setting<'_, '_> {
                 iterations: steps,
                 sigmas_left,
             };
-            let next = squares.reweighted(&p, &groups, DESCENT)?;
+            let next = squares.reweighted(&p, &groups, MEANS)?;
             let curvature = squares
                 .normal(&p, &groups)
                 .ok_or(no_way(sigmas_left))?
@@ -229,7 +220,7 @@ impl Setting<'_, '_> {
             (last, known) = (way, Some(linear.tangent));
             keep_small_cores(&mut p, &mut groups, self.least_core_m);
         }
-        if sigmas_left <= ALMOST_SIGMAS {
+        if sigmas_left <= ALMOST_CONVERGED_SIGMAS {
             let linear = self.linear(&p, &groups, None)?;
             return Ok(Linear {
                 counted: alike,
@@ -319,7 +310,7 @@ impl Setting<'_, '_> {
             pair_prior: None,
             ..squares.clone()
         }
-        .minimum(&calm, &wind, DESCENT);
+        .minimum(&calm, &wind, MEANS);
         let calm_cost = calm.map_or(f64::NAN, |calm| calm.normal.cost);
         let wake = Wake::from_list(p);
         Ok(MapFit {
@@ -337,6 +328,24 @@ impl Setting<'_, '_> {
             }],
         })
     }
+}
+
+/// A step back by more than this part of the one before turns round.
+const TURNED: f64 = 0.3;
+/// Most halvings of a step.
+const HALVINGS: i32 = 6;
+
+/// The part of a step of a fit to what is not smooth, as where peaks jump, from its product with the step before and that of the latter with
+/// itself: `turns` counts how often steps turned round, so that their ends are averaged (Kesten 1958). What only corrects a step that
+/// went too far is none of those.
+fn averaged(turns: &mut u32, with_last: f64, of_last: f64) -> f64 {
+    *turns += u32::from(-with_last > TURNED * of_last);
+    f64::from(1 + *turns).recip()
+}
+
+/// The first end that there is of a part of a step, its half, its quarter and so on.
+fn halved<T>(part: f64, end: impl Fn(f64) -> Option<T>) -> Option<T> {
+    (0..=HALVINGS).find_map(|halving| end(part * 0.5_f64.powi(halving)))
 }
 
 /// Standard deviations of the velocities of cells over those in uniform wind, as their residuals tell: ln|r| is a straight line over ln(1 +
@@ -442,5 +451,22 @@ mod tests {
                 .fold(0.0_f64, |worst, (a, b)| worst.max((a / b).ln().abs()));
             assert!(worst < 0.2, "{power}: {worst}");
         }
+    }
+
+    #[test]
+    fn steps_are_shortened_where_they_turn_round_and_halved_to_where_there_is_an_end() {
+        let mut turns = 0;
+        let products = [
+            (0.0, 0.0),
+            (2.0, 4.0),
+            (-1.0, 4.0),
+            (-2.0, 4.0),
+            (1.0, 4.0),
+            (-4.0, 4.0),
+        ];
+        let parts = products.map(|(with_last, of_last)| averaged(&mut turns, with_last, of_last));
+        assert_eq!(parts, [1.0, 1.0, 1.0, 0.5, 0.5, 1.0 / 3.0]);
+        assert_eq!(halved(0.8, |part| (part < 0.3).then_some(part)), Some(0.2));
+        assert_eq!(halved(1.0, |part| (part < 0.01).then_some(part)), None);
     }
 }

@@ -5,7 +5,8 @@
 
 use crate::error::Error;
 use crate::vortex_fit::map_fit::prediction::LONE_M;
-use crate::vortex_fit::top::{SAME_SIGMAS, distinct, mixed};
+use crate::vortex_fit::tolerances::{COMPETES, HOPELESS_OF_ESTIMATES, ONE_SIGMAS, SAME_SIGMAS};
+use crate::vortex_fit::top::{distinct, mixed};
 use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Vortex, Wake};
 
 /// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span, 3.8 to 6.4 % of the spacing).
@@ -17,12 +18,6 @@ const WEAK: f64 = 0.5;
 /// A typical core is known to this part of itself, after at most so many rounds.
 const TYPICAL: f64 = 0.05;
 const ROUNDS: usize = 3;
-/// Ends of rough fits that are closer lead to one.
-const ONE_SIGMAS: f64 = 1.0;
-/// Ends with a chi-square so much above the best one's are no part of its covariance.
-const COMPETES: f64 = 9.0;
-/// Ends with a chi-square so much above the best one's weigh less than a ten thousandth beside it.
-const HOPELESS: f64 = 20.0;
 
 /// The starts about a wake: its core radii are the one that is kept, the typical one, or that and others if they are fitted. Where one vortex is far
 /// weaker than the other, a pair of equal ones is the other start.
@@ -127,7 +122,7 @@ fn same(a: &MapFit, b: &MapFit, sigmas: f64) -> bool {
 /// The wakes of those ends of rough fits that lead to different ends, the best first, but for those that are hopeless.
 pub(crate) fn rivals(mut ends: Vec<MapFit>) -> Vec<Wake> {
     ends.sort_by(|a, b| chi2(a).total_cmp(&chi2(b)));
-    let hopeless = ends.first().map_or(f64::INFINITY, chi2) + HOPELESS;
+    let hopeless = ends.first().map_or(f64::INFINITY, chi2) + HOPELESS_OF_ESTIMATES;
     ends.retain(|end| chi2(end) <= hopeless);
     distinct(ends, |better, end| same(better, end, ONE_SIGMAS))
         .into_iter()

@@ -9,7 +9,9 @@ use ndarray::Array2;
 
 use crate::error::Error;
 use crate::linalg::dot;
-use crate::vortex_fit::damped_newton::{Normal, Stop, converged, lowest};
+use crate::vortex_fit::levenberg_marquardt::{
+    Curvature, Normal, StoppingRule, converged, levenberg_marquardt,
+};
 use crate::vortex_fit::signal_fit::likelihood::groups;
 use crate::vortex_fit::wake::free_parameters::{gathered, stepped};
 use crate::vortex_fit::{PARAMETERS, Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
@@ -110,12 +112,12 @@ impl Ascent<'_> {
         let mut curvature = self.information(&start, self.options.information_stride)?;
         let origin = vec![0.0; curvature.nrows()];
         let mut last: Option<(Vec<f64>, Vec<f64>)> = None;
-        let stop = Stop {
+        let stop = StoppingRule {
             iterations: self.options.max_iterations,
             sigmas: self.options.tolerance_sigmas,
-            learns: true,
+            curvature: Curvature::Secant,
         };
-        let end = lowest(
+        let end = levenberg_marquardt(
             origin,
             stop,
             |x: &Vec<f64>| {

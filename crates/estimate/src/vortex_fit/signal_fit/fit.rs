@@ -8,7 +8,7 @@ use ndarray::{Array2, ArrayView2};
 use std::rc::Rc;
 
 use crate::error::Error;
-use crate::vortex_fit::damped_newton::inverse;
+use crate::linalg::positive_definite::inverse;
 use crate::vortex_fit::signal_fit::ascent::{Ascent, State};
 use crate::vortex_fit::signal_fit::tops::{CORES_OVER_SPACING, Candidate, near_lines};
 use crate::vortex_fit::top::mixed;

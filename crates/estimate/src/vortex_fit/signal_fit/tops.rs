@@ -10,9 +10,10 @@ use ndarray::Array2;
 
 use crate::error::Error;
 use crate::linalg::dot;
-use crate::vortex_fit::damped_newton::{inverse, solve};
+use crate::linalg::positive_definite::{inverse, solve};
 use crate::vortex_fit::signal_fit::ascent::{Ascent, Parabola, State, times};
-use crate::vortex_fit::top::{SAME_SIGMAS, distinct};
+use crate::vortex_fit::tolerances::SAME_SIGMAS;
+use crate::vortex_fit::top::distinct;
 use crate::vortex_fit::{Parameter, ScanModel, SignalFitOptions, Wake};
 
 /// Core radii that are tried, over the spacing of the vortices.

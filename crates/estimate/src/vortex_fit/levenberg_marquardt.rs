@@ -1,0 +1,199 @@
+//! The iteration of Levenberg and Marquardt (Marquardt 1963) on a handful of parameters, which all fits share.
+//!
+//! Robust and quadratic losses differ in what `evaluate` returns. Check: a curved valley (Rosenbrock) is followed to its end; a point that cannot be
+//! evaluated is stepped back from.
+
+use ndarray::Array2;
+
+use crate::error::Error;
+use crate::linalg::positive_definite::solve;
+
+/// Cost, gradient and a positive approximation of the second derivatives at one point.
+#[derive(Debug, Clone)]
+pub(crate) struct Normal {
+    pub(crate) cost: f64,
+    pub(crate) gradient: Vec<f64>,
+    pub(crate) curvature: Array2<f64>,
+}
+
+/// With a secant curvature, longer steps than this many standard deviations are cut short.
+const LONGEST_SIGMAS: f64 = 4.0;
+
+/// Where the curvature of the cost comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Curvature {
+    /// From the derivatives at each point.
+    Exact,
+    /// From the changes of the gradient between points (a quasi-Newton update), so that a rejected step improves it too.
+    Secant,
+}
+
+/// When an iteration stops.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StoppingRule {
+    /// Most evaluations.
+    pub(crate) iterations: usize,
+    /// The step that remains, in standard deviations of the fit.
+    pub(crate) sigmas: f64,
+    pub(crate) curvature: Curvature,
+}
+
+impl StoppingRule {
+    /// With the exact curvature.
+    pub(crate) const fn new(iterations: usize, sigmas: f64) -> Self {
+        Self {
+            iterations,
+            sigmas,
+            curvature: Curvature::Exact,
+        }
+    }
+}
+
+/// The end of a descent.
+pub(crate) struct Minimum<P> {
+    pub(crate) at: P,
+    pub(crate) normal: Normal,
+    iterations: usize,
+    /// The step that is left \[standard deviations\].
+    pub(crate) sigmas_left: f64,
+}
+
+/// A minimum that was found.
+///
+/// # Errors
+/// [`Error::NotConverged`] after `stop.iterations` evaluations, or where no step goes downhill or there is no model.
+pub(crate) fn converged<P>(
+    end: Option<Minimum<P>>,
+    stop: StoppingRule,
+) -> Result<Minimum<P>, Error> {
+    match end {
+        Some(end) if end.sigmas_left <= stop.sigmas => Ok(end),
+        end => {
+            let (iterations, sigmas_left) =
+                end.map_or((0, f64::INFINITY), |end| (end.iterations, end.sigmas_left));
+            Err(Error::NotConverged {
+                iterations,
+                sigmas_left,
+            })
+        }
+    }
+}
+
+/// Goes downhill from `start` until the step that is left is below `stop.sigmas` standard deviations (the curvature taken
+/// as the inverse covariance), no step goes downhill or there are no evaluations left.
+/// `evaluate` returns nothing where the model does not exist, `moved` adds a step. Nothing if it does not at the start.
+pub(crate) fn levenberg_marquardt<P: Clone>(
+    start: P,
+    stop: StoppingRule,
+    mut evaluate: impl FnMut(&P) -> Option<Normal>,
+    moved: impl Fn(&P, &[f64]) -> P,
+) -> Option<Minimum<P>> {
+    let is_secant = stop.curvature == Curvature::Secant;
+    let mut at = start;
+    let mut here = evaluate(&at)?;
+    let mut damping = 1e-3;
+    let mut left = f64::INFINITY;
+    let end = |at, normal, iterations, sigmas_left| {
+        Some(Minimum {
+            at,
+            normal,
+            iterations,
+            sigmas_left,
+        })
+    };
+    for iteration in 1..=stop.iterations {
+        let down: Vec<f64> = here.gradient.iter().map(|g| -g).collect();
+        if let Some(newton) = solve(&here.curvature, &down) {
+            left = newton
+                .iter()
+                .zip(&down)
+                .map(|(s, d)| s * d)
+                .sum::<f64>()
+                .max(0.0)
+                .sqrt();
+            if left <= stop.sigmas {
+                return end(at, here, iteration, left);
+            }
+        }
+        let mut damped = here.curvature.clone();
+        damped.diag_mut().mapv_inplace(|d| d * (1.0 + damping));
+        let mut step = solve(&damped, &down);
+        if let (true, Some(step)) = (is_secant && left > LONGEST_SIGMAS, &mut step) {
+            step.iter_mut().for_each(|s| *s *= LONGEST_SIGMAS / left);
+        }
+        let trial = step.as_ref().map(|step| moved(&at, step));
+        let there = trial.as_ref().and_then(&mut evaluate);
+        // gain promised by the quadratic model
+        let promised = step.map_or(0.0, |s| {
+            0.5 * s.iter().zip(&down).map(|(s, d)| s * d).sum::<f64>()
+        });
+        match (trial, there) {
+            (Some(trial), Some(there)) if here.cost - there.cost > 1e-4 * promised => {
+                let ratio = (here.cost - there.cost) / promised;
+                damping = if ratio > 0.75 {
+                    (damping * 0.1).max(1e-9)
+                } else {
+                    damping
+                };
+                at = trial;
+                here = there;
+            }
+            (_, refused) => {
+                if let (true, Some(refused)) = (is_secant, refused) {
+                    here.curvature = refused.curvature;
+                }
+                damping = (damping * 10.0).max(1e-4);
+            }
+        }
+        if damping > 1e12 {
+            return end(at, here, iteration, left);
+        }
+    }
+    end(at, here, stop.iterations, left)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    /// Rosenbrock's valley as a sum of squares, which does not exist beyond a wall.
+    fn valley(p: &[f64; 2]) -> Option<Normal> {
+        if p[0] > 1.5 {
+            return None;
+        }
+        let residual = [1.0 - p[0], 10.0 * (p[1] - p[0] * p[0])];
+        let jacobian = array![[-1.0, 0.0], [-20.0 * p[0], 10.0]];
+        let gradient = jacobian.t().dot(&ndarray::arr1(&residual)).to_vec();
+        let cost = 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
+        Some(Normal {
+            cost,
+            gradient,
+            curvature: jacobian.t().dot(&jacobian),
+        })
+    }
+
+    #[test]
+    fn a_curved_valley_is_followed_to_its_end() {
+        let moved = |p: &[f64; 2], s: &[f64]| [p[0] + s[0], p[1] + s[1]];
+        let stop = StoppingRule::new(100, 1e-9);
+        let descend =
+            |start, stop| converged(levenberg_marquardt(start, stop, valley, moved), stop);
+        let Minimum {
+            at: end, normal, ..
+        } = descend([-1.2, 1.0], stop).unwrap();
+        assert!((end[0] - 1.0).abs() < 1e-8 && (end[1] - 1.0).abs() < 1e-8 && normal.cost < 1e-16);
+        let hasty = descend(
+            [-1.2, 1.0],
+            StoppingRule {
+                iterations: 3,
+                ..stop
+            },
+        );
+        assert!(matches!(
+            hasty,
+            Err(Error::NotConverged { iterations: 3, .. })
+        ));
+        assert!(descend([2.0, 1.0], stop).is_err());
+    }
+}
