@@ -41,12 +41,11 @@ pub(crate) struct Cell {
 
 impl Cells {
     pub(crate) fn new(map: &VelocityMap<'_>, model: &WakeModel) -> Self {
-        let (lines, gates) = (map.elevation_rad.len(), map.range_m.len());
+        let lines = map.elevation_rad.len();
+        let gates = map.range_m.len();
         let (by_line, by_gate) = map.blocks(MOST_CELLS);
-        let (elevation_rad, range_m) = (
-            block_means(map.elevation_rad, by_line),
-            block_means(map.range_m, by_gate),
-        );
+        let elevation_rad = block_means(map.elevation_rad, by_line);
+        let range_m = block_means(map.range_m, by_gate);
         let weight = |line: usize, gate: usize| {
             let known = map.velocity_m_s[[line, gate]].is_finite();
             known.then(|| map.deviation(line, gate).powi(-2))

@@ -199,7 +199,10 @@ fn one(
     let (range_m, elevation_rad) = model.range_and_elevation(vortex.place_m());
     let away = |gate: &usize| (spectra.range_m[*gate] - range_m).abs();
     let gate = (0..spectra.range_m.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
-    let (mut raw, mut narrowed, mut inverted, mut left_out) = (vec![], vec![], vec![], 0);
+    let mut raw = vec![];
+    let mut narrowed = vec![];
+    let mut inverted = vec![];
+    let mut left_out = 0;
     let calm = shape.calm_width_m_s(spectra.snr, threshold).unwrap_or(0.0);
     let share = model.profile.mean_5_15(vortex.core_radius_m).0;
     for (line, elevation) in spectra.elevation_rad.iter().enumerate() {
@@ -253,7 +256,8 @@ fn one(
         inverted.push(share * found);
     }
     let mean = |numbers: &[f64]| numbers.iter().sum::<f64>() / numbers.len() as f64;
-    let (value, count) = (mean(&inverted), inverted.len() as f64);
+    let value = mean(&inverted);
+    let count = inverted.len() as f64;
     let squares: f64 = inverted.iter().map(|x| (x - value).powi(2)).sum();
     EnvelopeResult {
         side,

@@ -58,12 +58,11 @@ fn fit_unfolded(
     let map = bounded.as_ref().unwrap_or(&unfolded.map);
     // broad blocks are enough to search in
     let few = map.medians(SEARCHED);
-    let (gates, sought) = (Gates::rough(map, options)?, few.as_ref().unwrap_or(map));
+    let gates = Gates::rough(map, options)?;
+    let sought = few.as_ref().unwrap_or(map);
     let sought_gates = Gates::rough(sought, options)?;
-    let (mut all, mut search) = (
-        Stage::new(map, options, &gates),
-        Stage::new(sought, options, &sought_gates),
-    );
+    let mut all = Stage::new(map, options, &gates);
+    let mut search = Stage::new(sought, options, &sought_gates);
     let mut starts = search.starts()?;
     for (_, start) in &mut starts {
         *start = unfolded.with_wind(start);
@@ -73,7 +72,8 @@ fn fit_unfolded(
     if map.sigma_m_s.is_none() {
         // what the wind leaves, until fits are known
         let winds = (search.wind(&about)?, all.wind(&about)?);
-        (search, all) = (search.rescaled(&winds.0), all.rescaled(&winds.1));
+        search = search.rescaled(&winds.0);
+        all = all.rescaled(&winds.1);
     }
     let found = search.ends_of(&starts);
     let likely = least(&found, search.squares.cells.len());
@@ -107,7 +107,8 @@ fn finished(
     scale: f64,
     about: &Wake,
 ) -> Result<(ScanResult, Option<(Wake, Movement)>), Error> {
-    let (map, options) = (all.map, all.options);
+    let map = all.map;
+    let options = all.options;
     let dense = Gates::on_grid(map, options, 1)?;
     let frozen = dense.clone().frozen();
     let stage = all.through(&dense);
@@ -133,7 +134,8 @@ fn finished(
     ends.extend(aliases::rivals(chosen, &ends, scale));
     let fine = gates.fine(&options.gate)?;
     let stage = stage.through(&fine);
-    let (wind, ends) = (stage.wind(about)?, stage.fine(&ends));
+    let wind = stage.wind(about)?;
+    let ends = stage.fine(&ends);
     let (wind, other_wind_competes) = aliases::best_wind(&stage, wind, scale);
     let mut result = with_alternatives(&Report {
         stage: &stage,
@@ -216,10 +218,8 @@ fn in_scale<'a>(mut stage: Stage<'a>, likely: Option<&End>) -> (Stage<'a>, f64) 
 /// What makes the velocities of a stage white.
 fn whitening(stage: &Stage<'_>, turbulence: &Turbulence) -> Result<Whitening, Error> {
     let place = |cell: &Cell| {
-        let (range_m, elevation_rad) = (
-            stage.map.range_m[cell.gate],
-            stage.map.elevation_rad[cell.line],
-        );
+        let range_m = stage.map.range_m[cell.gate];
+        let elevation_rad = stage.map.elevation_rad[cell.line];
         (
             stage.gates.model.position_m(range_m, elevation_rad),
             cell.sigma_m_s,

@@ -99,7 +99,8 @@ fn gaussian(std_m: f64, spacing_m: f64, points: usize) -> Result<RangeKernel, Er
 
 /// Distance of the gates if it is the same everywhere.
 fn uniform_step_m(range_m: &[f64]) -> Option<f64> {
-    let (first, last) = (range_m.first()?, range_m.last()?);
+    let first = range_m.first()?;
+    let last = range_m.last()?;
     let step = (last - first) / (range_m.len() - 1) as f64;
     let even = range_m
         .iter()

@@ -80,7 +80,8 @@ impl Kind {
 
     /// Whether two wakes are one but for a part of each parameter.
     fn same(self, a: &Wake, b: &Wake, part: f64) -> bool {
-        let (a, b) = (a.to_array(), b.to_array());
+        let a = a.to_array();
+        let b = b.to_array();
         (0..PARAMETERS).all(|i| (a[i] - b[i]).abs() <= part * a[i].abs().max(20.0) || !self.has(i))
     }
 }
@@ -426,7 +427,8 @@ pub(crate) fn tops<'a>(
     let mut sorted: Vec<&End> = ends.iter().filter(|end| end.kind == best.kind).collect();
     sorted.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     distinct(sorted, |top, end| {
-        let (a, b) = (end.wake.to_array(), top.wake.to_array());
+        let a = end.wake.to_array();
+        let b = top.wake.to_array();
         let near = |i: usize| {
             let sigma = covariance[[i, i]].sqrt();
             (a[i] - b[i]).abs() <= (SAME_SIGMAS * sigma).max(SAME_FRACTION * a[i].abs().max(1.0))

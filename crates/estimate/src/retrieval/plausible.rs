@@ -91,7 +91,8 @@ pub fn without_implausible_vortices(
 
 impl Limit {
     fn in_words(&self, value: f64) -> String {
-        let (low, high) = (self.allowed.start(), self.allowed.end());
+        let low = self.allowed.start();
+        let high = self.allowed.end();
         let allowed = if high.is_finite() {
             format!("at most {high}")
         } else {

@@ -52,7 +52,8 @@ pub fn radial_velocity_method(
     let unfolded = unfolded.map;
     let gates = Gates::rough(&unfolded, &linear)?.fine(&linear.gate)?;
     let mut stage = Stage::new(&unfolded, &linear, &gates);
-    (stage.squares.loss, stage.is_noise_left) = (options.loss, false);
+    stage.squares.loss = options.loss;
+    stage.is_noise_left = false;
     if map.sigma_m_s.is_none() {
         let calm = stage.wind(&nothing)?;
         stage = stage.rescaled(&calm);
@@ -132,7 +133,8 @@ pub fn radial_velocity_method(
 fn spread(elevation_rad: &[f64], velocity: &[f64], left: bool) -> (f64, f64) {
     // a right vortex is a left one with the velocities turned round
     let sign = if left { 1.0 } else { -1.0 };
-    let (mut lowest, mut best) = ((f64::INFINITY, 0.0), (0.0, 0.0));
+    let mut lowest = (f64::INFINITY, 0.0);
+    let mut best = (0.0, 0.0);
     for (elevation, velocity) in elevation_rad
         .iter()
         .zip(velocity)

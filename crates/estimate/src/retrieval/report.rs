@@ -62,7 +62,8 @@ impl<'a> Report<'a> {
             without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2) / alike
         };
         let statistic = likely.map_or(0.0, |end| gain(Some(self.wind), end));
-        let (left, right) = (best(self.ends, Kind::Left), best(self.ends, Kind::Right));
+        let left = best(self.ends, Kind::Left);
+        let right = best(self.ends, Kind::Right);
         let lone = [left, right]
             .into_iter()
             .flatten()
@@ -116,7 +117,8 @@ impl<'a> Report<'a> {
 
     /// The vortices of an end with that covariance, each at its line.
     pub(crate) fn vortices(&self, end: &End, covariance: &Array2<f64>) -> Vec<VortexResult> {
-        let (model, moves) = (self.stage.gates.model, self.stage.gates.seconds.is_some());
+        let model = self.stage.gates.model;
+        let moves = self.stage.gates.seconds.is_some();
         let vortex = |side| {
             VortexResult::at_its_line(self.stage.map, model, (&end.wake, covariance), side, moves)
         };

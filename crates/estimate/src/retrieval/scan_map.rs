@@ -69,7 +69,8 @@ impl ScanMap {
             return unfolded;
         };
         for ((line, gate), velocity) in unfolded.velocity_m_s.indexed_iter_mut() {
-            let (range_m, elevation_rad) = (self.range_m[gate], self.elevation_rad[line]);
+            let range_m = self.range_m[gate];
+            let elevation_rad = self.elevation_rad[line];
             let away_m_s = *velocity - model.radial_velocity_m_s(wake, range_m, elevation_rad);
             *velocity -= fold * (away_m_s / fold).round();
         }

@@ -95,7 +95,8 @@ pub(super) fn with_secondary_vortices(
 fn widen(result: &mut ScanResult, map: &ScanMap, all: &Array2<f64>, options: &RetrievalOptions) {
     let grown: Vec<f64> = (0..all.nrows())
         .map(|place| {
-            let (own, all) = (result.covariance[[place, place]], all[[place, place]]);
+            let own = result.covariance[[place, place]];
+            let all = all[[place, place]];
             if own > 0.0 {
                 (all / own).sqrt().max(1.0)
             } else {

@@ -90,7 +90,8 @@ impl Track {
                 core_radius_m,
             })
         };
-        let (left, right) = (vortex(Side::Left)?, vortex(Side::Right)?);
+        let left = vortex(Side::Left)?;
+        let right = vortex(Side::Right)?;
         let wake = Wake::calm(left, right);
         wake.validate().is_ok().then_some(wake)
     }
@@ -130,7 +131,8 @@ pub fn track(results: &[&ScanResult], acceleration_density_m2_s3: f64) -> Result
         .try_for_each(|time| finite("reference_time_s", *time))?;
     increasing("reference_time_s", &times)?;
     not_empty("results", results.len())?;
-    let (steps, innovations) = (vec![], vec![]);
+    let steps = vec![];
+    let innovations = vec![];
     let mut filter = Filter {
         acceleration_density_m2_s3,
         steps,
@@ -193,14 +195,16 @@ struct Filter {
 impl Filter {
     /// Prediction to the next scan; a vortex that does not live is forgotten.
     fn predicted(&self, before: &State, alive: [bool; 2], seconds: f64) -> (Array2<f64>, State) {
-        let (mut transition, mut noise) = (Array2::eye(BOTH), Array2::zeros((BOTH, BOTH)));
+        let mut transition = Array2::eye(BOTH);
+        let mut noise = Array2::zeros((BOTH, BOTH));
         for (i, alive) in alive.into_iter().enumerate() {
             for (place, sign, density) in [
                 (0, 1.0, self.acceleration_density_m2_s3),
                 (2, 1.0, self.acceleration_density_m2_s3),
                 (4, -1.0, DECAY_DENSITY_PER_S3),
             ] {
-                let (a, b) = (ONE * i + place, ONE * i + place + 1);
+                let a = ONE * i + place;
+                let b = ONE * i + place + 1;
                 if alive {
                     transition[[a, b]] = sign * seconds;
                     noise[[a, a]] = density * seconds.powi(3) / 3.0;
@@ -208,8 +212,10 @@ impl Filter {
                     noise[[a, b]] = sign * density * seconds.powi(2) / 2.0;
                     noise[[b, a]] = noise[[a, b]];
                 } else {
-                    (transition[[a, a]], transition[[b, b]]) = (0.0, 0.0);
-                    (noise[[a, a]], noise[[b, b]]) = (1.0, 1.0);
+                    transition[[a, a]] = 0.0;
+                    transition[[b, b]] = 0.0;
+                    noise[[a, a]] = 1.0;
+                    noise[[b, b]] = 1.0;
                 }
             }
         }
@@ -233,7 +239,8 @@ impl Filter {
             .last()
             .map_or((&nothing, [false; 2]), |step| (&step.filtered, step.alive));
         let (transition, mut predicted) = self.predicted(before, alive, seconds);
-        let (mut taken, mut lost) = ([None; 2], [false; 2]);
+        let mut taken = [None; 2];
+        let mut lost = [false; 2];
         for (i, side) in Side::BOTH.into_iter().enumerate() {
             let seen = result
                 .vortex(side)
@@ -241,7 +248,9 @@ impl Filter {
             if let (false, Some(vortex)) = (alive[i], seen) {
                 if soon.iter().any(|next| next.vortex(side).is_some()) {
                     Self::born(&mut predicted, i, vortex);
-                    (alive[i], self.misses[i], taken[i]) = (true, 0, Some(vortex));
+                    alive[i] = true;
+                    self.misses[i] = 0;
+                    taken[i] = Some(vortex);
                 }
                 continue;
             }
@@ -335,8 +344,10 @@ impl Filter {
         vortices: &[(usize, &VortexResult)],
     ) -> Result<(f64, State), Error> {
         let order = 3 * vortices.len();
-        let (mut z, mut h) = (Array1::zeros(order), Array2::zeros((order, BOTH)));
-        let (mut deviations, mut places) = (vec![], vec![]);
+        let mut z = Array1::zeros(order);
+        let mut h = Array2::zeros((order, BOTH));
+        let mut deviations = vec![];
+        let mut places = vec![];
         for (n, (i, vortex)) in vortices.iter().enumerate() {
             let seconds = if vortex.time_s.is_finite() {
                 vortex.time_s - result.reference_time_s
@@ -354,7 +365,8 @@ impl Filter {
         }
         let c = &result.covariance;
         let r = Array2::from_shape_fn((order, order), |(i, j)| {
-            let (a, b) = (places[i], places[j]);
+            let a = places[i];
+            let b = places[j];
             let correlation = if i == j {
                 1.0
             } else {

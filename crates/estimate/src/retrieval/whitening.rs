@@ -18,7 +18,8 @@ impl Whitening {
     pub(crate) fn new(cells: &[((f64, f64), f64)], turbulence: &Turbulence) -> Option<Self> {
         let variance = turbulence.deviation_m_s.powi(2);
         let covariance = Array2::from_shape_fn((cells.len(), cells.len()), |(i, k)| {
-            let (((ya, za), sigma), ((yb, zb), _)) = (cells[i], cells[k]);
+            let ((ya, za), sigma) = cells[i];
+            let ((yb, zb), _) = cells[k];
             match k.cmp(&i) {
                 std::cmp::Ordering::Less => {
                     variance * (-(ya - yb).hypot(za - zb) / turbulence.length_m).exp()

@@ -73,7 +73,8 @@ impl Bank {
                 (low.min(x), high.max(x))
             })
         };
-        let (across_m, mut up_m) = (between(|place| place.0), between(|place| place.1));
+        let across_m = between(|place| place.0);
+        let mut up_m = between(|place| place.1);
         if model.images {
             up_m.0 = up_m.0.max(STEP_M);
         }

@@ -167,9 +167,11 @@ impl WakeDetector {
         let cells = &self.filter.cells.cells;
         let row =
             |i: usize| wind_velocities(&self.filter.cells, i).map(|x| x / cells[i].deviation_m_s);
-        let (mut curvature, mut towards) = (Array2::zeros((2, 2)), [0.0; 2]);
+        let mut curvature = Array2::zeros((2, 2));
+        let mut towards = [0.0; 2];
         for i in (0..means.len()).filter(|&i| means[i].is_finite()) {
-            let (row, value) = (row(i), means[i] / cells[i].deviation_m_s);
+            let row = row(i);
+            let value = means[i] / cells[i].deviation_m_s;
             for a in 0..2 {
                 towards[a] += row[a] * value;
                 (0..2).for_each(|b| curvature[[a, b]] += row[a] * row[b]);

@@ -158,13 +158,15 @@ impl EmptyScanLaw {
         )?;
         let least = self.least_counted_rate();
         if false_alarm < least {
-            let (anchor, share) = (self.statistics[COUNTED - 1], false_alarm / least);
+            let anchor = self.statistics[COUNTED - 1];
+            let share = false_alarm / least;
             let tail = share * self.tail(anchor);
             return Ok(self.location - self.scale * (-(-tail).ln_1p()).ln());
         }
         // between the k-th and the next one, k/n the rate
         let place = (false_alarm * self.scans() as f64).min((self.scans() - 1) as f64);
-        let (k, part) = (place as usize, place.fract());
+        let k = place as usize;
+        let part = place.fract();
         Ok(self.statistics[k - 1] + part * (self.statistics[k] - self.statistics[k - 1]))
     }
 

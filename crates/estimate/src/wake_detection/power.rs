@@ -40,8 +40,8 @@ impl WakeDetector {
             (0..TRIES.0).find_map(|_| {
                 let spacing_m = between(self.spacing_m);
                 (0..TRIES.1).find_map(|_| {
-                    let (left_m, height_m) =
-                        (between(self.bank.lateral_m), between(self.bank.up_m));
+                    let left_m = between(self.bank.lateral_m);
+                    let height_m = between(self.bank.up_m);
                     let places_m =
                         [left_m, left_m + spacing_m].map(|lateral_m| (lateral_m, height_m));
                     let [left, right] =
@@ -67,7 +67,8 @@ impl WakeDetector {
         stream: impl Fn(u64) -> R + Sync + Send,
     ) -> Result<DetectionTrials<'_>, Error> {
         not_empty("wakes and trials", wakes.len().min(trials))?;
-        let (mut products, mut deviations) = (Vec::new(), Vec::new());
+        let mut products = Vec::new();
+        let mut deviations = Vec::new();
         for wake in wakes {
             wake.validate()?;
             let mean_m2_s = 0.5 * (wake.left.circulation_m2_s + wake.right.circulation_m2_s);
@@ -183,7 +184,8 @@ impl DetectionTrials<'_> {
 
 /// The circulation that nine in ten trials find, sought from `about` on \[m^2/s\].
 fn found_nine_times(missed: &[[f64; 2]], about: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 2.0 * about);
+    let mut low = 0.0;
+    let mut high = 2.0 * about;
     while share(missed, high).value < 0.9 && high < 64.0 * about {
         high *= 2.0;
     }

@@ -100,10 +100,8 @@ impl ScanDetection {
     /// Whether what is left of the scan is so correlated that the stated background cannot be the true one.
     #[must_use]
     pub fn is_correlated(&self) -> bool {
-        let ((along, across), errors) = (
-            self.statistic.neighbour_correlation,
-            self.statistic.correlation_error,
-        );
+        let (along, across) = self.statistic.neighbour_correlation;
+        let errors = self.statistic.correlation_error;
         along > CORRELATED * errors.0 || across > CORRELATED * errors.1
     }
 }
@@ -314,8 +312,8 @@ pub fn detect(
     settings: &DetectionSettings,
     observer: &dyn Observer,
 ) -> Result<(Vec<ScanDetection>, Option<Calibration>), Error> {
-    let (mut found, mut calibrations) =
-        (Vec::with_capacity(scans.len()), Vec::<Calibration>::new());
+    let mut found = Vec::with_capacity(scans.len());
+    let mut calibrations = Vec::<Calibration>::new();
     for scan in scans {
         let cleaned = cleaned(scan, settings);
         if !calibrations

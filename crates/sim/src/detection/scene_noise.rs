@@ -75,7 +75,8 @@ impl SceneNoise {
         let white = whitened(maps, &deviations(maps, 0));
         let correlation = |lines: usize, gates: usize| {
             let products = white.iter().flat_map(|map| {
-                let (far, near) = ([map.nrows() - lines, map.ncols() - gates], [lines, gates]);
+                let far = [map.nrows() - lines, map.ncols() - gates];
+                let near = [lines, gates];
                 (&map.slice(s![near[0].., near[1]..]) * &map.slice(s![..far[0], ..far[1]]))
                     .into_iter()
             });

@@ -19,10 +19,8 @@ pub fn scan_table(scans: &[ReadScan], found: &[ScanDetection]) -> Table {
             })
             .collect::<Vec<_>>()
     };
-    let (left, right) = (
-        |f: &ScanDetection| f.statistic.wake.left,
-        |f: &ScanDetection| f.statistic.wake.right,
-    );
+    let left = |f: &ScanDetection| f.statistic.wake.left;
+    let right = |f: &ScanDetection| f.statistic.wake.right;
     Table::new()
         .text("file", scans.iter().map(ReadScan::file_name))
         .int("sweep", scans.iter().map(|scan| scan.sweep as i64))

@@ -55,14 +55,16 @@ pub fn envelopes(
     };
     let window_sigma_s =
         relative_half_width * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
-    let (wavelength_m, band_hz) = (scene.laser.wavelength_m, scene.detector.bandwidth_hz);
+    let wavelength_m = scene.laser.wavelength_m;
+    let band_hz = scene.detector.bandwidth_hz;
     let shape = SpectralShape::gaussian(
         plan.instrument.pulse.sigma_s(),
         window_sigma_s,
         wavelength_m,
         band_hz,
     )?;
-    let (gates, cells) = (spectra.range_m.len(), spectra.velocity_m_s.len());
+    let gates = spectra.range_m.len();
+    let cells = spectra.velocity_m_s.len();
     let order = upward(lines, &spectra.elevation_rad);
     let power = Array3::from_shape_fn((order.len(), gates, cells), |(line, gate, cell)| {
         f64::from(spectra.density[(order[line] * gates + gate) * cells + cell])

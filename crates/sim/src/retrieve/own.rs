@@ -37,7 +37,8 @@ pub fn retrieve_signals(
     found: RetrievedScan,
     observer: &dyn Observer,
 ) -> Result<RetrievedScan, Error> {
-    let ((range, elevation_rad), all) = (measured.lines.all_records(), 0..records.samples);
+    let (range, elevation_rad) = measured.lines.all_records();
+    let all = 0..records.samples;
     match own.scene.detector.signal {
         DetectorSignal::IntermediateFrequency => own.of_records(
             samples::<f64>(records, range, all)?.view(),

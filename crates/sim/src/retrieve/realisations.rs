@@ -89,7 +89,8 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
         Stage::Retrieval,
         (maps.len() * sweeps.len() * wanted.methods.len()) as u64,
     );
-    let (mut rows, g) = (Vec::new(), &plan.geometry);
+    let mut rows = Vec::new();
+    let g = &plan.geometry;
     let time_s: Vec<f64> = g
         .line_time_s
         .iter()
@@ -188,7 +189,8 @@ fn of_signals<S: Sample + wakescope_signal::Sample>(
     };
     let schedule = &plan.geometry.schedule;
     let is_own = |pulse: usize| lines.contains(&schedule.line_of(pulse));
-    let (mut samples, mut elevation_rad): (Vec<S>, Vec<f64>) = (Vec::new(), Vec::new());
+    let mut samples: Vec<S> = Vec::new();
+    let mut elevation_rad: Vec<f64> = Vec::new();
     scanner.in_pieces::<S>(realisation, &Silent, |first, records| {
         for (pulse, record) in (first..)
             .zip(records.outer_iter())

@@ -167,7 +167,8 @@ fn errors(number: usize, rows: &[&RetrievalRow]) -> Option<([usize; 2], [f64; 6]
     let mean = |get: &dyn Fn(&(f64, f64)) -> f64| values.iter().map(get).sum::<f64>() / n;
     let bias = mean(&|v| v.0);
     let std = (values.iter().map(|v| (v.0 - bias).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-    let (rms, stated) = (mean(&|v| v.0 * v.0).sqrt(), mean(&|v| v.1 * v.1).sqrt());
+    let rms = mean(&|v| v.0 * v.0).sqrt();
+    let stated = mean(&|v| v.1 * v.1).sqrt();
     // One value has no deviation.
     let own = if values.len() > 1 { std } else { f64::NAN };
     Some((

@@ -64,7 +64,8 @@ pub(super) fn is_there(truth: &VortexResult) -> bool {
 pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResult; 2], Error> {
     match &plan.scene().flow {
         Flow::VortexPair(pair) => {
-            let (air, profile) = (vortex_pair(pair), pair.profile);
+            let air = vortex_pair(pair);
+            let profile = pair.profile;
             // Behind an aircraft, the wake in the plane of the scan has its age there.
             let x_m = plan.scene().scan.lidar.x_m;
             let since_s = pair
@@ -125,7 +126,8 @@ fn when_passed(
     lines: &[usize],
     centre: impl Fn(f64) -> Result<(f64, f64), Error>,
 ) -> Result<Passage, Error> {
-    let (g, lidar_m) = (&plan.geometry, plan.scene().scan.lidar_height_m);
+    let g = &plan.geometry;
+    let lidar_m = plan.scene().scan.lidar_height_m;
     let times_s = || {
         lines
             .iter()
@@ -154,7 +156,8 @@ fn simulated(plan: &Plan, lines: &[usize], side: Side) -> Result<VortexResult, E
     let sense = if side == Side::Left { -1.0 } else { 1.0 };
     let centre = |time_s: f64| {
         let [left, right] = [-1.0, 1.0].map(|sense| strongest(plan, time_s, sense));
-        let (left, right) = (left?, right?);
+        let left = left?;
+        let right = right?;
         let reach_m = REACH_OVER_SPACING * (left.0 - right.0).hypot(left.1 - right.1);
         centroid(
             plan,
@@ -180,7 +183,8 @@ fn vorticity(
     step_m: f64,
 ) -> Result<Vec<PlaceAndVorticity>, Error> {
     let count = |low: f64, high: f64| ((high - low) / step_m).ceil().max(0.0) as usize + 1;
-    let (columns, rows) = (count(low_m.0, high_m.0), count(low_m.1, high_m.1));
+    let columns = count(low_m.0, high_m.0);
+    let rows = count(low_m.1, high_m.1);
     let place = |i: usize| {
         (
             low_m.0 + (i % columns) as f64 * step_m,
@@ -211,7 +215,8 @@ fn vorticity(
 
 /// The place of the scan where the vorticity of a sign is strongest.
 fn strongest(plan: &Plan, time_s: f64, sense: f64) -> Result<(f64, f64), Error> {
-    let (scan, g) = (&plan.scene().scan, &plan.geometry);
+    let scan = &plan.scene().scan;
+    let g = &plan.geometry;
     let top = g
         .elevation_rad
         .iter()
@@ -250,11 +255,15 @@ fn centroid(
             (centre_m.0 - edge, centre_m.1 - edge),
             (centre_m.0 + edge, centre_m.1 + edge),
         );
-        let (mut sum, mut y, mut z) = (0.0, 0.0, 0.0);
+        let mut sum = 0.0;
+        let mut y = 0.0;
+        let mut z = 0.0;
         for ((at_y, at_z), value) in vorticity(plan, time_s, around, FINE_M)? {
             let near = (at_y - centre_m.0).hypot(at_z - centre_m.1) <= reach_m;
             let weight = if near { (sense * value).max(0.0) } else { 0.0 };
-            (sum, y, z) = (sum + weight, y + weight * at_y, z + weight * at_z);
+            sum += weight;
+            y += weight * at_y;
+            z += weight * at_z;
         }
         if sum <= 0.0 {
             break;

@@ -65,7 +65,8 @@ impl<'p> Retrieval<'p> {
     /// The circulation that the velocities of a map, m/s, have; NaN where the fit came to no end, nothing where none can be tried.
     pub(crate) fn circulation_m2_s(&self, velocity_m_s: &Array2<f64>) -> Option<f64> {
         let shown = self.response.response(self.pair.lateral_position_m)?;
-        let (scene, g) = (self.plan.scene(), &self.plan.geometry);
+        let scene = self.plan.scene();
+        let g = &self.plan.geometry;
         let step = self.response.gate_stride(&g.gate_range_m);
         let range_m: Vec<f64> = g.gate_range_m.iter().copied().step_by(step).collect();
         let map = VelocityMap {
@@ -96,7 +97,8 @@ impl<'p> Retrieval<'p> {
 
     /// The bound on the circulation, m^2/s; the pair where it is in the middle of the scan.
     fn bound_m2_s(&self) -> Result<f64, crate::Error> {
-        let (scene, g) = (self.plan.scene(), &self.plan.geometry);
+        let scene = self.plan.scene();
+        let g = &self.plan.geometry;
         let time_s = 0.5 * (self.plan.wind.start_s + self.plan.scan_end_s());
         let centres = vortex_pair(&self.pair).centres(time_s);
         let vortex = |lateral_position_m: f64| Vortex {

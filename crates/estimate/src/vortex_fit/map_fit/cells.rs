@@ -44,7 +44,8 @@ pub(crate) fn products(weights: &[f64], columns: &[Vec<f64>]) -> Array2<f64> {
         let scaled = scaled(weights, a);
         for (j, b) in columns.iter().enumerate().take(i + 1) {
             let product = dot(&scaled, b);
-            (out[[i, j]], out[[j, i]]) = (product, product);
+            out[[i, j]] = product;
+            out[[j, i]] = product;
         }
     }
     out
@@ -54,7 +55,8 @@ pub(crate) fn products(weights: &[f64], columns: &[Vec<f64>]) -> Array2<f64> {
 pub(crate) fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for column in columns {
-        let (mut rest, before) = (column.clone(), dot(column, column));
+        let mut rest = column.clone();
+        let before = dot(column, column);
         (0..2).for_each(|_| remove(&basis, &mut rest));
         let norm = dot(&rest, &rest);
         if norm > 1e-12 * before {

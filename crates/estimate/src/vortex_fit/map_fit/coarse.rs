@@ -85,14 +85,17 @@ impl Coarse {
                 .map(|at| neighbours(chosen, at))
                 .collect::<Vec<_>>()
         };
-        let (lines, gates) = (about(&self.lines, size.0), about(&self.gates, size.1));
+        let lines = about(&self.lines, size.0);
+        let gates = about(&self.gates, size.1);
         Array2::from_shape_fn(size, |(line, gate)| {
             let [mut sum, mut shares] = [0.0; 2];
             for (i, by_line) in lines[line] {
                 for (j, by_gate) in gates[gate] {
-                    let (share, number) = (by_line * by_gate, some[[i, j]]);
+                    let share = by_line * by_gate;
+                    let number = some[[i, j]];
                     if share > 0.0 && number.is_finite() {
-                        (sum, shares) = (sum + share * number, shares + share);
+                        sum += share * number;
+                        shares += share;
                     }
                 }
             }
@@ -116,7 +119,8 @@ fn every(count: usize, step: f64) -> (usize, Vec<usize>) {
 /// The chosen places before and after a place, with their shares.
 fn neighbours(chosen: &[usize], at: usize) -> [(usize, f64); 2] {
     let next = chosen.partition_point(|&place| place <= at);
-    let (low, high) = (next.saturating_sub(1), next.min(chosen.len() - 1));
+    let low = next.saturating_sub(1);
+    let high = next.min(chosen.len() - 1);
     let gap = chosen[high] - chosen[low];
     let share = if gap == 0 {
         0.0

@@ -26,7 +26,8 @@ pub struct VelocityMap<'a> {
 impl VelocityMap<'_> {
     /// Checks shapes and axes, and counts the velocities.
     pub(crate) fn validate(&self) -> Result<usize, Error> {
-        let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
+        let lines = self.elevation_rad.len();
+        let gates = self.range_m.len();
         length("lines of velocity_m_s", lines, self.velocity_m_s.nrows())?;
         length("gates of velocity_m_s", gates, self.velocity_m_s.ncols())?;
         validate_axes(self.elevation_rad, self.range_m)?;
@@ -44,7 +45,8 @@ impl VelocityMap<'_> {
 
     /// Distance of neighbouring lines in the middle of the map.
     pub(crate) fn line_spacing_m(&self) -> f64 {
-        let ((near_m, far_m), (low_rad, high_rad)) = (ends(self.range_m), ends(self.elevation_rad));
+        let (near_m, far_m) = ends(self.range_m);
+        let (low_rad, high_rad) = ends(self.elevation_rad);
         (near_m + 0.5 * (far_m - near_m)) * (high_rad - low_rad) / self.elevation_rad.len() as f64
     }
 
@@ -58,9 +60,12 @@ impl VelocityMap<'_> {
 
     /// Lines and gates of blocks, about as wide as long, of which the map has no more than `most`.
     pub(crate) fn blocks(&self, most: usize) -> (usize, usize) {
-        let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
-        let (line_m, gate_m) = (self.line_spacing_m(), self.gate_spacing_m());
-        let (mut by_line, mut by_gate) = (1, 1);
+        let lines = self.elevation_rad.len();
+        let gates = self.range_m.len();
+        let line_m = self.line_spacing_m();
+        let gate_m = self.gate_spacing_m();
+        let mut by_line = 1;
+        let mut by_gate = 1;
         while lines.div_ceil(by_line) * gates.div_ceil(by_gate) > most {
             if by_line as f64 * line_m <= by_gate as f64 * gate_m && by_line < lines
                 || by_gate >= gates

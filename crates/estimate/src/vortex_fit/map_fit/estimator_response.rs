@@ -169,7 +169,8 @@ impl<'a> EstimatorResponse<'a> {
         (elevation_rad, range_m): (&'r [f64], &'r [f64]),
         coarser: f64,
     ) -> Result<Prepared<'r>, Error> {
-        let (period_s, sigma_s) = (self.sampling.period_s(), self.pulse.sigma_s);
+        let period_s = self.sampling.period_s();
+        let sigma_s = self.pulse.sigma_s;
         let lags = self.tapers[0].weights.len();
         let gap_m = range_m
             .windows(2)
@@ -215,10 +216,8 @@ impl<'a> EstimatorResponse<'a> {
         let powers: Vec<f64> = weights.iter().step_by(numbers).copied().collect();
         let power: f64 = powers.iter().sum();
         let least = 0.5 * LEFT_OUT * power;
-        let (before, after) = (
-            below(powers.iter(), least),
-            below(powers.iter().rev(), least),
-        );
+        let before = below(powers.iter(), least);
+        let after = below(powers.iter().rev(), least);
         weights.truncate((powers.len() - after) * numbers);
         weights.drain(..before * numbers);
         weights.iter_mut().for_each(|weight| *weight /= power);
@@ -290,7 +289,8 @@ impl Prepared<'_> {
 
     /// The map of a wake by a model.
     pub(crate) fn velocities(&self, model: &WakeModel, wake: &Wake) -> Array2<f64> {
-        let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
+        let lines = self.elevation_rad.len();
+        let gates = self.range_m.len();
         let wakes = self.wakes(model, wake);
         let correlograms = map_indexed(lines, Vec::new, |phasors, line| {
             self.line(
@@ -318,7 +318,8 @@ impl Prepared<'_> {
 
     /// Variance of the velocities \[m^2/s^2\] of the air that each place of the map sees.
     pub(crate) fn variances(&self, wake: &Wake) -> Array2<f64> {
-        let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
+        let lines = self.elevation_rad.len();
+        let gates = self.range_m.len();
         let nearest_m = self.range_m.first().copied().unwrap_or(0.0);
         let wakes = self.wakes(self.model, wake);
         let moments = map_each(lines, |line| {
@@ -396,13 +397,16 @@ const LANES: usize = 8;
 /// Powers 0, 1, ... of unit phasors, given as sine and cosine: a row for each.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 fn fill_powers(phasors: &mut [f64], turns: &[(f64, f64)], kind: SignalKind) {
-    let (count, parts) = (phasors.len() / turns.len().max(1), kind.lag_numbers(1));
+    let count = phasors.len() / turns.len().max(1);
+    let parts = kind.lag_numbers(1);
     for (rows, turns) in phasors.chunks_mut(LANES * count).zip(turns.chunks(LANES)) {
-        let (mut sin, mut cos) = ([0.0; LANES], [1.0; LANES]);
+        let mut sin = [0.0; LANES];
+        let mut cos = [1.0; LANES];
         for (lane, turn) in turns.iter().enumerate() {
             (sin[lane], cos[lane]) = *turn;
         }
-        let (mut re, mut im) = ([1.0; LANES], [0.0; LANES]);
+        let mut re = [1.0; LANES];
+        let mut im = [0.0; LANES];
         for number in (0..count).step_by(parts) {
             for lane in 0..turns.len() {
                 rows[lane * count + number] = re[lane];
@@ -411,7 +415,8 @@ fn fill_powers(phasors: &mut [f64], turns: &[(f64, f64)], kind: SignalKind) {
                 }
             }
             for lane in 0..LANES {
-                let (x, y) = (re[lane], im[lane]);
+                let x = re[lane];
+                let y = im[lane];
                 re[lane] = x * cos[lane] - y * sin[lane];
                 im[lane] = y * cos[lane] + x * sin[lane];
             }
@@ -424,13 +429,12 @@ fn fill_powers(phasors: &mut [f64], turns: &[(f64, f64)], kind: SignalKind) {
 fn add_seen(lags: &mut [f64], weights: &[f64], phasors: &[f64], share: f64) {
     let count = lags.len();
     // two nodes at a time: the sums are loaded and stored half as often
-    let (pairs, nodes) = (
-        weights.chunks_exact(2 * count),
-        phasors.chunks_exact(2 * count),
-    );
+    let pairs = weights.chunks_exact(2 * count);
+    let nodes = phasors.chunks_exact(2 * count);
     let last = weights.len() / (2 * count) * 2 * count;
     for (weights, phasors) in pairs.zip(nodes) {
-        let ((w, x), (t, u)) = (weights.split_at(count), phasors.split_at(count));
+        let (w, x) = weights.split_at(count);
+        let (t, u) = phasors.split_at(count);
         for i in 0..count {
             lags[i] += share * (w[i] * t[i] + x[i] * u[i]);
         }

@@ -107,7 +107,8 @@ impl Search {
 
     /// The wake of a pair, without wind.
     fn wake(&self, pair: &Pair) -> Wake {
-        let (left, right) = (self.places_m[pair.left], self.places_m[pair.right]);
+        let left = self.places_m[pair.left];
+        let right = self.places_m[pair.right];
         let core_m = CORE_OVER_SPACING * (right.0 - left.0);
         Wake::calm(
             Vortex::at(left, pair.strength.0, core_m),
@@ -119,13 +120,12 @@ impl Search {
     fn pairs(&self) -> Vec<Pair> {
         let best = |left: usize| {
             // a clockwise vortex shows the opposite shape
-            let (a, aa) = (-self.towards[left], self.gram[[left, left]]);
+            let a = -self.towards[left];
+            let aa = self.gram[[left, left]];
             let pair = |right: usize| {
-                let (b, bb, ab) = (
-                    self.towards[right],
-                    self.gram[[right, right]],
-                    -self.gram[[left, right]],
-                );
+                let b = self.towards[right];
+                let bb = self.gram[[right, right]];
+                let ab = -self.gram[[left, right]];
                 let determinant = aa * bb - ab * ab;
                 let strength = (
                     (a * bb - b * ab) / determinant,

@@ -319,7 +319,9 @@ impl Uncertainty<'_> {
 
 /// Variance of a fit with that loss over that of least squares, for normal residuals.
 fn inflation(loss: Loss) -> f64 {
-    let (mut squares, mut curvature, mut sum) = (0.0, 0.0, 0.0);
+    let mut squares = 0.0;
+    let mut curvature = 0.0;
+    let mut sum = 0.0;
     for i in -800..=800 {
         let r = 0.01 * f64::from(i);
         let density = (-0.5 * r * r).exp();

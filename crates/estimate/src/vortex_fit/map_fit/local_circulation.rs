@@ -66,7 +66,8 @@ pub(crate) fn joined(pair: &MapFit, local: &[Option<Local>; 2]) -> Option<MapFit
     if local.iter().flatten().map(|local| local.gain).sum::<f64>() < LEAST_GAIN {
         return None;
     }
-    let (mut p, mut covariance) = (pair.wake.to_array(), pair.covariance.clone());
+    let mut p = pair.wake.to_array();
+    let mut covariance = pair.covariance.clone();
     for (at, local) in CIRCULATIONS
         .into_iter()
         .map(|parameter| parameter as usize)

@@ -77,7 +77,8 @@ impl<'a> Plane<'a> {
     fn new(cells: &'a [Cell]) -> Self {
         let most = |of: fn(&Cell) -> usize| cells.iter().map(of).max().unwrap_or(0) + 1;
         let extent = (most(|cell| cell.line), most(|cell| cell.gate));
-        let (lines, gates) = (fast_length(2 * extent.0), fast_length(2 * extent.1));
+        let lines = fast_length(2 * extent.0);
+        let gates = fast_length(2 * extent.1);
         Self {
             cells,
             extent,
@@ -226,10 +227,8 @@ struct Correlogram<'a> {
 
 impl<'a> Correlogram<'a> {
     fn new(plane: &'a Plane<'a>, residuals: &[f64], slopes: &[Vec<f64>]) -> Self {
-        let (pairs, sums) = (
-            plane.power(&vec![1.0; residuals.len()]),
-            plane.power(residuals),
-        );
+        let pairs = plane.power(&vec![1.0; residuals.len()]);
+        let sums = plane.power(residuals);
         let basis = orthonormal(slopes);
         let basis_spectra: Vec<_> = basis.iter().map(|column| plane.spectrum(column)).collect();
         let mut white: Vec<f64> = vec![0.0; pairs.len()];
@@ -330,22 +329,17 @@ impl<'a> Correlogram<'a> {
     /// The best strengths at given lengths.
     fn at(&self, lengths: (f64, f64)) -> Fitted {
         let shape = self.expected(&exponential(self.plane, lengths));
-        let (aa, ab, bb) = (
-            self.product(&self.white, &self.white),
-            self.product(&self.white, &shape),
-            self.product(&shape, &shape),
-        );
-        let (a, b) = (
-            self.product(&self.sums, &self.white),
-            self.product(&self.sums, &shape),
-        );
+        let aa = self.product(&self.white, &self.white);
+        let ab = self.product(&self.white, &shape);
+        let bb = self.product(&shape, &shape);
+        let a = self.product(&self.sums, &self.white);
+        let b = self.product(&self.sums, &shape);
         let determinant = aa * bb - ab * ab;
-        let (mut white, mut correlated) = (
-            (a * bb - b * ab) / determinant,
-            (b * aa - a * ab) / determinant,
-        );
+        let mut white = (a * bb - b * ab) / determinant;
+        let mut correlated = (b * aa - a * ab) / determinant;
         if white < 0.0 {
-            (white, correlated) = (0.0, b / bb);
+            white = 0.0;
+            correlated = b / bb;
         }
         let left = if correlated > 0.0 {
             self.left(white, correlated, &shape)
@@ -374,7 +368,8 @@ impl<'a> Correlogram<'a> {
         if alone.left - best.left < 2.0 * BEYOND_CHANCE * alone.white * alone.white {
             return alone;
         }
-        let (mut best, mut ratio) = (best, COARSE);
+        let mut best = best;
+        let mut ratio = COARSE;
         while ratio > FINE {
             let (i, j) = best.lengths;
             let tried = [
@@ -409,7 +404,9 @@ pub(crate) fn of_neighbours(
     };
     let alike = correlation.iter().sum::<f64>().max(1.0);
     let mut scores = plane.quadratic(all.slopes, &correlation);
-    let (mut weights, mut weights2, mut squares) = (0.0, 0.0, 0.0);
+    let mut weights = 0.0;
+    let mut weights2 = 0.0;
+    let mut squares = 0.0;
     for (i, residual) in all.residuals.iter().enumerate().filter(|_| order > 0) {
         let slopes: Vec<f64> = all.slopes.iter().map(|slope| slope[i]).collect();
         let slopes = ArrayView1::from(&slopes);
@@ -428,10 +425,8 @@ pub(crate) fn of_neighbours(
 
 /// Correlation of residuals with those of their neighbours on the grid, 0 beyond where it ends.
 fn neighbours(plane: &Plane<'_>, residuals: &[f64], lines: usize) -> Option<Vec<f64>> {
-    let (sums, pairs) = (
-        plane.power(residuals),
-        plane.power(&vec![1.0; residuals.len()]),
-    );
+    let sums = plane.power(residuals);
+    let pairs = plane.power(&vec![1.0; residuals.len()]);
     let means = sums
         .iter()
         .zip(&pairs)

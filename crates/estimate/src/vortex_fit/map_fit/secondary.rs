@@ -83,7 +83,8 @@ impl Setting<'_, '_> {
         if !are_seen && !always {
             return None;
         }
-        let (lines, mut groups) = (self.options.correlated_lines, self.options.free.groups());
+        let lines = self.options.correlated_lines;
+        let mut groups = self.options.free.groups();
         let two = pair.to_array().to_vec();
         let alone = self.linear(&two, &groups, None).ok()?;
         let counted = self.about(&alone).alike(&two, lines);
@@ -180,7 +181,8 @@ impl Setting<'_, '_> {
             inverse,
             step,
         };
-        let ((left, a), (right, b)) = (self.beside(0, &free)?, self.beside(1, &free)?);
+        let (left, a) = self.beside(0, &free)?;
+        let (right, b) = self.beside(1, &free)?;
         Some(([left, right], a + b, explained))
     }
 

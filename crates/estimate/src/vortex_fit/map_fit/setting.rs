@@ -77,7 +77,8 @@ impl Setting<'_, '_> {
     }
 
     fn squares<'s>(&'s self, prediction: &'s dyn Prediction, cells: Vec<Cell>) -> LeastSquares<'s> {
-        let (loss, prior) = (self.options.loss, self.options.core_prior);
+        let loss = self.options.loss;
+        let prior = self.options.core_prior;
         LeastSquares {
             prediction,
             fold_m_s: None,
@@ -102,7 +103,8 @@ impl Setting<'_, '_> {
     /// are the same for both, those that it leaves: a scale that each fit takes from its own residuals changes by chance, and with it the likelihood
     /// of all.
     pub(crate) fn gain(&self, better: &Linear, than: &Linear) -> f64 {
-        let (cells, counted) = (better.shared_with(than), better.counted);
+        let cells = better.shared_with(than);
+        let counted = better.counted;
         let of = |linear: &Linear| {
             let squares = LeastSquares {
                 cells: cells.clone(),
@@ -166,12 +168,15 @@ impl Setting<'_, '_> {
         stop: StoppingRule,
         counted: Option<f64>,
     ) -> Result<Linear, Error> {
-        let (mut groups, mut released) = (all.to_vec(), false);
+        let mut groups = all.to_vec();
+        let mut released = false;
         let mut turns = 0;
         let mut last = vec![0.0; p.len()];
         let mut sigmas_left = f64::INFINITY;
         let mut known: Option<Tangent> = None;
-        let (mut alike, mut steps, mut most) = (counted.unwrap_or(1.0), 0, stop.iterations);
+        let mut alike = counted.unwrap_or(1.0);
+        let mut steps = 0;
+        let mut most = stop.iterations;
         while steps < most {
             steps += 1;
             let serves = |known: &Tangent| {
@@ -207,7 +212,9 @@ impl Setting<'_, '_> {
             if sigmas_left <= stop.sigmas {
                 // a core that shrank on the way, as where the pair was narrow, may show where it ends
                 if groups.len() < all.len() && !released {
-                    (groups, released, most) = (all.to_vec(), true, steps + stop.iterations);
+                    groups = all.to_vec();
+                    released = true;
+                    most = steps + stop.iterations;
                     continue;
                 }
                 return Ok(linear);
@@ -217,7 +224,8 @@ impl Setting<'_, '_> {
                 self.prediction.allows(&trial).then_some(trial)
             });
             p = there.ok_or(no_way(sigmas_left))?;
-            (last, known) = (way, Some(linear.tangent));
+            last = way;
+            known = Some(linear.tangent);
             keep_small_cores(&mut p, &mut groups, self.least_core_m);
         }
         if sigmas_left <= ALMOST_CONVERGED_SIGMAS {
@@ -245,7 +253,8 @@ impl Setting<'_, '_> {
             .predict(p, if known.is_some() { &[] } else { groups });
         let mut slopes_at = p.to_vec();
         if let Some(known) = known {
-            (slopes_at, here.slopes) = (known.slopes_at, known.here.slopes);
+            slopes_at = known.slopes_at;
+            here.slopes = known.here.slopes;
         }
         let mut cells = cells(self.map);
         cells.retain(|cell| {
@@ -365,13 +374,11 @@ fn learnt_deviations(
     for (cell, broad) in cells.iter().zip(&broad) {
         let log = residual(cell).abs().ln();
         if log.is_finite() {
-            (n, x, y, xx, xy) = (
-                n + 1.0,
-                x + broad,
-                y + log,
-                xx + broad * broad,
-                xy + broad * log,
-            );
+            n += 1.0;
+            x += broad;
+            y += log;
+            xx += broad * broad;
+            xy += broad * log;
         }
     }
     let power = ((n * xy - x * y) / (n * xx - x * x)).clamp(0.0, 1.0);

@@ -69,7 +69,8 @@ pub(crate) fn best_of(
     starts: &[Wake],
     fit: impl Fn(&Wake) -> Result<MapFit, Error>,
 ) -> Result<MapFit, Error> {
-    let (mut ends, mut failed) = (Vec::new(), None);
+    let mut ends = Vec::new();
+    let mut failed = None;
     for start in starts {
         match fit(start) {
             Ok(end) => ends.push(end),
@@ -145,10 +146,8 @@ fn merged(mut ends: Vec<MapFit>) -> Option<MapFit> {
             &end.covariance,
         )
     });
-    let (covariance, tops) = (
-        mixed(weighted, &best.wake),
-        all.iter().flat_map(|end| end.tops.clone()).collect(),
-    );
+    let covariance = mixed(weighted, &best.wake);
+    let tops = all.iter().flat_map(|end| end.tops.clone()).collect();
     Some(MapFit {
         covariance,
         tops,

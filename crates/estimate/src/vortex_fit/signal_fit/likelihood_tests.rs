@@ -242,7 +242,8 @@ fn covariance_of_the_gradient_over_draws_is_the_information() {
         })
         .collect();
     let trials = 1500;
-    let (mut mean, mut square) = (0.0, 0.0);
+    let mut mean = 0.0;
+    let mut square = 0.0;
     for _ in 0..trials {
         let rays = [0, 1, 0].map(|line: usize| {
             let factor = &factors[line];

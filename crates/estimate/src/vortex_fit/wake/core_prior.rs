@@ -38,7 +38,8 @@ impl CorePrior {
         if !wake.is_pair() {
             return Vec::new();
         }
-        let (p, spacing_m) = (wake.to_array(), wake.spacing_m());
+        let p = wake.to_array();
+        let spacing_m = wake.spacing_m();
         let term = |place: usize| {
             let away = (p[place] / (self.median_ratio * spacing_m)).ln() / self.log_deviation;
             let mut all = [0.0; PARAMETERS];
@@ -96,7 +97,8 @@ pub(crate) fn secondary_terms(p: &[f64], groups: &[Vec<usize>]) -> Vec<(f64, Vec
     let slopes = groups.iter().map(|group| {
         let step = 1e-6 * p[group[0]].abs().max(1.0);
         let at = |by: f64| away(&stepped(std::slice::from_ref(group), p, &[by]));
-        let (ahead, behind) = (at(step), at(-step));
+        let ahead = at(step);
+        let behind = at(-step);
         std::array::from_fn(|i| (ahead[i / 3][i % 3] - behind[i / 3][i % 3]) / (2.0 * step))
     });
     let slopes: Vec<[f64; 6]> = slopes.collect();

@@ -116,7 +116,8 @@ impl FreeParameters {
         ] {
             if sharing == Sharing::Common {
                 let mean = 0.5 * (p[a] + p[b]);
-                (p[a], p[b]) = (mean, mean);
+                p[a] = mean;
+                p[b] = mean;
             }
         }
         Wake::from_array(&p)

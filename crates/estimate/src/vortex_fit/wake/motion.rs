@@ -27,7 +27,8 @@ impl Motion {
                 p[place] += by;
                 model.centre_velocities_m_s(&Wake::from_array(&p))
             };
-            let (ahead, behind) = (moved(step), moved(-step));
+            let ahead = moved(step);
+            let behind = moved(-step);
             for ((row, ahead), behind) in slopes.iter_mut().zip(ahead).zip(behind) {
                 row[place] = (ahead - behind) / (2.0 * step);
             }
@@ -63,10 +64,8 @@ impl WakeModel {
     /// Range \[m\] and elevation \[rad\] at which the lidar sees a place (y, z) \[m\].
     #[must_use]
     pub fn range_and_elevation(&self, (lateral_m, height_m): (f64, f64)) -> (f64, f64) {
-        let (dy, dz) = (
-            lateral_m - self.lidar_lateral_position_m,
-            height_m - self.lidar_height_m,
-        );
+        let dy = lateral_m - self.lidar_lateral_position_m;
+        let dz = height_m - self.lidar_height_m;
         (dy.hypot(dz), dz.atan2(dy))
     }
 
@@ -100,7 +99,8 @@ impl WakeModel {
             }
             [lateral_m_s, vertical_m_s]
         };
-        let ([a, b], [c, d]) = (at(&wake.left), at(&wake.right));
+        let [a, b] = at(&wake.left);
+        let [c, d] = at(&wake.right);
         [a, b, c, d]
     }
 }

@@ -109,7 +109,8 @@ impl Wake {
     /// The parameters in the order of [`Parameter`].
     #[must_use]
     pub fn to_array(&self) -> [f64; PARAMETERS] {
-        let (l, r) = (&self.left, &self.right);
+        let l = &self.left;
+        let r = &self.right;
         [
             l.circulation_m2_s,
             r.circulation_m2_s,
@@ -368,10 +369,8 @@ impl WakeModel {
 
     /// Distance at which a line of sight passes the centre of a vortex \[m\].
     pub(crate) fn passes_m(&self, ray: Ray, vortex: &Vortex) -> f64 {
-        let (dy, dz) = (
-            vortex.lateral_position_m - self.lidar_lateral_position_m,
-            vortex.height_m - self.lidar_height_m,
-        );
+        let dy = vortex.lateral_position_m - self.lidar_lateral_position_m;
+        let dz = vortex.height_m - self.lidar_height_m;
         (dy * ray.sin - dz * ray.cos).abs()
     }
 
@@ -380,11 +379,9 @@ impl WakeModel {
         &self,
         wake: &'w Wake,
     ) -> impl Iterator<Item = (&'w Vortex, [usize; 4], f64, f64)> + use<'w> {
-        let (left, right, images) = (
-            (&wake.left, [0, 2, 3, 6]),
-            (&wake.right, [1, 4, 5, 7]),
-            self.images,
-        );
+        let left = (&wake.left, [0, 2, 3, 6]);
+        let right = (&wake.right, [1, 4, 5, 7]);
+        let images = self.images;
         let of = move |((vortex, places), side, sense)| (vortex, places, side, sense);
         let all = [
             (left, 1.0, -1.0),
@@ -462,10 +459,8 @@ fn of_source(
     (y_m, z_m): (f64, f64),
     ray: Ray,
 ) -> (f64, [f64; 4]) {
-    let (dy, dz) = (
-        y_m - vortex.lateral_position_m,
-        z_m - side * vortex.height_m,
-    );
+    let dy = y_m - vortex.lateral_position_m;
+    let dz = z_m - side * vortex.height_m;
     let (omega, by_r2, by_core) = profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
     let arm = dy * ray.sin - dz * ray.cos;
     let strength = sense * vortex.circulation_m2_s;

@@ -56,7 +56,8 @@ impl PairWeights {
         let step_s = 0.5 * interval_s;
         let half = (pulse.reach_s() / step_s).ceil() as usize;
         let weight = |node: i64, lag: usize| {
-            let (middle_s, apart_s) = (node as f64 * step_s, lag as f64 * step_s);
+            let middle_s = node as f64 * step_s;
+            let apart_s = lag as f64 * step_s;
             pulse.at(middle_s + apart_s) * pulse.at(middle_s - apart_s)
         };
         let nodes = -(half as i64)..=half as i64;

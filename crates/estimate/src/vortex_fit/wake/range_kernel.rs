@@ -141,7 +141,8 @@ impl RangeKernel {
         let ratio = self.spacing_m / spacing_m;
         let mut weights = vec![0.0; ((self.weights.len() - 1) as f64 * ratio) as usize + 2];
         for (i, weight) in self.weights.iter().enumerate() {
-            let (place, part) = ((i as f64 * ratio) as usize, (i as f64 * ratio).fract());
+            let place = (i as f64 * ratio) as usize;
+            let part = (i as f64 * ratio).fract();
             weights[place] += (1.0 - part) * weight;
             weights[place + 1] += part * weight;
         }
