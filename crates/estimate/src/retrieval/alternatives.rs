@@ -53,7 +53,7 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
         alike,
     } = report.chosen()?;
     if end.kind == Kind::Wind {
-        return Ok(report.told(end, covariance, statistic));
+        return Ok(report.result(end, covariance, statistic));
     }
     let vortices = report.vortices(end, &covariance);
     let mut all = vec![Alternative {
@@ -87,7 +87,7 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
     let is_ambiguous = all[..spacings]
         .iter()
         .any(|one| competes(one) && apart(one));
-    let told = if is_ambiguous {
+    let reported = if is_ambiguous {
         nearest_to_the_mean_spacing(&all[..spacings])
     } else {
         end
@@ -95,7 +95,7 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
     let weighted = all
         .iter()
         .map(|one| (one.weight, &one.end.wake, &one.covariance));
-    let mut result = report.told(told, mixed(weighted, &told.wake), statistic);
+    let mut result = report.result(reported, mixed(weighted, &reported.wake), statistic);
     result
         .vortices
         .iter_mut()

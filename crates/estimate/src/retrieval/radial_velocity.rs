@@ -117,7 +117,7 @@ pub fn radial_velocity_method(
         statistic,
         ..
     } = report.chosen()?;
-    let mut result = report.told(end, covariance, statistic);
+    let mut result = report.result(end, covariance, statistic);
     for vortex in &mut result.vortices {
         for place in [&mut vortex.lateral_position_m, &mut vortex.height_m] {
             *place = Measured {

@@ -142,12 +142,12 @@ impl<'a> Report<'a> {
             .uncertainty(&end.wake.to_array(), &end.groups, from)
     }
 
-    pub(crate) fn told(&self, end: &End, covariance: Array2<f64>, statistic: f64) -> ScanResult {
+    /// The result that an end is reported as.
+    pub(crate) fn result(&self, end: &End, covariance: Array2<f64>, statistic: f64) -> ScanResult {
         let residuals = self.stage.squares.rows(&end.wake.to_array(), &[]).residuals;
         let used = residuals.iter().filter(|r| r.abs() <= OUTLIER * self.scale);
         let (count, squares) = used.fold((0, 0.0), |(count, sum), r| (count + 1, sum + r * r));
         let cells_rejected = self.stage.rejected + residuals.len() - count;
-        let moves = self.stage.gates.seconds.is_some();
         let mut vortices = self.vortices(end, &covariance);
         // what is beyond the sector is hardly known, though it acts
         if vortices.iter().any(|vortex| self.margin_m(vortex) >= 0.0) {
@@ -160,6 +160,33 @@ impl<'a> Report<'a> {
                 chi2: end.chi2,
             })
             .collect();
+        let flags = self.flags(end, &vortices, &tops, statistic, cells_rejected);
+        ScanResult {
+            wake: (!vortices.is_empty()).then_some(end.wake),
+            reference_time_s: self.stage.map.middle_s(),
+            lateral_wind_m_s: Measured::of_wake(Parameter::Wind, &end.wake, &covariance),
+            wind_shear_per_s: Measured::of_wake(Parameter::Shear, &end.wake, &covariance),
+            chi2_per_dof: squares / (count.saturating_sub(end.groups.len()).max(1)) as f64,
+            cells_used: count,
+            cells_rejected,
+            statistic,
+            threshold: self.stage.options.threshold,
+            flags,
+            vortices,
+            covariance,
+            tops,
+        }
+    }
+
+    /// What is to be thought of an end whose vortices are reported.
+    fn flags(
+        &self,
+        end: &End,
+        vortices: &[VortexResult],
+        tops: &[Top],
+        statistic: f64,
+        cells_rejected: usize,
+    ) -> Vec<Flag> {
         let spacing_m = if end.kind == Kind::Both {
             end.wake.spacing_m()
         } else {
@@ -172,14 +199,10 @@ impl<'a> Report<'a> {
             .is_some_and(|(second, first)| {
                 second.chi2 - first.chi2 < COMPETES * self.scale.powi(2)
             });
-        let instant = self.stage.map.has_times()
-            && self
-                .stage
-                .map
-                .time_s
-                .windows(2)
-                .all(|pair| pair[0] == pair[1]);
-        let unmoved = !moves && !instant;
+        let map = self.stage.map;
+        let is_instant = map.has_times() && map.time_s.windows(2).all(|pair| pair[0] == pair[1]);
+        let is_at_rest = self.stage.gates.seconds.is_none() && !is_instant;
+        let cells = self.stage.rejected + self.stage.squares.cells.len();
         let stands_out = statistic >= self.stage.options.threshold;
         let flags = [
             (Flag::NoWake, vortices.is_empty() && !stands_out),
@@ -194,36 +217,18 @@ impl<'a> Report<'a> {
                 vortices.iter().any(|vortex| self.margin_m(vortex) < SEEN_M),
             ),
             (Flag::NearGround, vortices.iter().any(low)),
-            (Flag::MotionIgnored, unmoved),
+            (Flag::MotionIgnored, is_at_rest),
             (Flag::Ambiguous, competes),
             (Flag::PoorFit, self.scale.powi(2) > POOR),
             (
                 Flag::Outliers,
-                cells_rejected as f64
-                    > MANY_OUTLIERS * (self.stage.rejected + residuals.len()) as f64,
+                cells_rejected as f64 > MANY_OUTLIERS * cells as f64,
             ),
             (Flag::Thinned, self.stage.thinned),
             (Flag::NotConverged, end.sigmas_left > NOT_CONVERGED_SIGMAS),
         ];
-        ScanResult {
-            wake: (!vortices.is_empty()).then_some(end.wake),
-            reference_time_s: self.stage.map.middle_s(),
-            lateral_wind_m_s: Measured::of_wake(Parameter::Wind, &end.wake, &covariance),
-            wind_shear_per_s: Measured::of_wake(Parameter::Shear, &end.wake, &covariance),
-            chi2_per_dof: squares / (count.saturating_sub(end.groups.len()).max(1)) as f64,
-            cells_used: count,
-            cells_rejected,
-            statistic,
-            threshold: self.stage.options.threshold,
-            flags: flags
-                .into_iter()
-                .filter(|(_, set)| *set)
-                .map(|(flag, _)| flag)
-                .collect(),
-            vortices,
-            covariance,
-            tops,
-        }
+        let set = flags.into_iter().filter(|(_, is_set)| *is_set);
+        set.map(|(flag, _)| flag).collect()
     }
 
     /// How far the sector reaches beyond a centre \[m\]; negative outside.

@@ -169,47 +169,16 @@ impl<'a> EstimatorResponse<'a> {
         (elevation_rad, range_m): (&'r [f64], &'r [f64]),
         coarser: f64,
     ) -> Result<Prepared<'r>, Error> {
-        let period_s = self.sampling.period_s();
-        let sigma_s = self.pulse.sigma_s;
+        let spacing_m = self.node_spacing_m(range_m, coarser);
         let lags = self.tapers[0].weights.len();
-        let gap_m = range_m
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .fold(f64::INFINITY, f64::min);
-        let widest_m = coarser * NODE_M.min(NODE_OVER_PULSE * 0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
-        // gates fall on nodes unless they are so close that this would take many more
-        let fits = gap_m.is_finite() && gap_m > 0.25 * widest_m;
-        let spacing_m = if fits {
-            gap_m / (gap_m / widest_m).ceil()
-        } else {
-            widest_m
-        };
-        let half_s = 0.5 * lags as f64 * period_s;
+        let numbers = self.kind.lag_numbers(lags);
+        let half_s = 0.5 * lags as f64 * self.sampling.period_s();
         let reach =
             (0.5 * SPEED_OF_LIGHT_M_S * (half_s + self.pulse.reach_s()) / spacing_m).ceil() as i64;
-        let numbers = self.kind.lag_numbers(lags);
         let mut weights = Vec::with_capacity((2 * reach + 1) as usize * numbers);
         for node in -reach..=reach {
             let away_s = 2.0 * node as f64 * spacing_m / SPEED_OF_LIGHT_M_S;
-            let seen: Vec<f64> = (0..lags)
-                .map(|n| self.pulse.at(n as f64 * period_s - half_s - away_s))
-                .collect();
-            let tapered: Vec<Vec<f64>> = self
-                .tapers
-                .iter()
-                .map(|taper| {
-                    taper
-                        .weights
-                        .iter()
-                        .zip(&seen)
-                        .map(|(h, f)| h * f)
-                        .collect()
-                })
-                .collect();
-            for m in 0..lags {
-                let of =
-                    |(taper, g): (&Taper, &Vec<f64>)| taper.factor * dot(&g[m..], &g[..lags - m]);
-                let weight: f64 = self.tapers.iter().zip(&tapered).map(of).sum();
+            for weight in self.node_weights(away_s) {
                 weights.extend(std::iter::repeat_n(weight, numbers / lags));
             }
         }
@@ -221,16 +190,11 @@ impl<'a> EstimatorResponse<'a> {
         weights.truncate((powers.len() - after) * numbers);
         weights.drain(..before * numbers);
         weights.iter_mut().for_each(|weight| *weight /= power);
-        let regions =
-            Array2::from_shape_fn((elevation_rad.len(), range_m.len()), |(line, gate)| {
-                region(
-                    elevation_rad,
-                    line,
-                    range_m[gate],
-                    (self.radius_m)(range_m[gate]),
-                )
-                .collect()
-            });
+        let size = (elevation_rad.len(), range_m.len());
+        let regions = Array2::from_shape_fn(size, |(line, gate)| {
+            let radius_m = (self.radius_m)(range_m[gate]);
+            region(elevation_rad, line, range_m[gate], radius_m).collect()
+        });
         let of_lag_0: Vec<f64> = weights.iter().step_by(numbers).copied().collect();
         let kernel = RangeKernel::new(
             (before as f64 - reach as f64) * spacing_m,
@@ -256,6 +220,47 @@ impl<'a> EstimatorResponse<'a> {
             regions,
             seconds,
         })
+    }
+
+    /// Distance of nodes of the air \[m\]: gates at those ranges fall on them unless they are so close that this would take many more.
+    fn node_spacing_m(&self, range_m: &[f64], coarser: f64) -> f64 {
+        let gaps_m = range_m.windows(2).map(|pair| pair[1] - pair[0]);
+        let gap_m = gaps_m.fold(f64::INFINITY, f64::min);
+        let of_pulse_m = NODE_OVER_PULSE * 0.5 * SPEED_OF_LIGHT_M_S * self.pulse.sigma_s;
+        let widest_m = coarser * NODE_M.min(of_pulse_m);
+        if gap_m.is_finite() && gap_m > 0.25 * widest_m {
+            gap_m / (gap_m / widest_m).ceil()
+        } else {
+            widest_m
+        }
+    }
+
+    /// Weights of each lag for the air whose echo comes `away_s` \[s\] after that of the middle of the gate.
+    fn node_weights(&self, away_s: f64) -> Vec<f64> {
+        let lags = self.tapers[0].weights.len();
+        let period_s = self.sampling.period_s();
+        let half_s = 0.5 * lags as f64 * period_s;
+        let pulse: Vec<f64> = (0..lags)
+            .map(|n| self.pulse.at(n as f64 * period_s - half_s - away_s))
+            .collect();
+        let mut tapered: Vec<Vec<f64>> = Vec::new();
+        for taper in &self.tapers {
+            tapered.push(
+                taper
+                    .weights
+                    .iter()
+                    .zip(&pulse)
+                    .map(|(h, f)| h * f)
+                    .collect(),
+            );
+        }
+        let weight = |m: usize| {
+            let terms = self.tapers.iter().zip(&tapered);
+            terms
+                .map(|(taper, g)| taper.factor * dot(&g[m..], &g[..lags - m]))
+                .sum()
+        };
+        (0..lags).map(weight).collect()
     }
 }
 

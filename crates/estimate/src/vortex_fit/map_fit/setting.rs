@@ -169,7 +169,7 @@ impl Setting<'_, '_> {
         counted: Option<f64>,
     ) -> Result<Linear, Error> {
         let mut groups = all.to_vec();
-        let mut released = false;
+        let mut are_cores_released = false;
         let mut turns = 0;
         let mut last = vec![0.0; p.len()];
         let mut sigmas_left = f64::INFINITY;
@@ -195,25 +195,18 @@ impl Setting<'_, '_> {
                 sigmas_left,
             };
             let next = squares.reweighted(&p, &groups, MEANS)?;
-            let curvature = squares
-                .normal(&p, &groups)
-                .ok_or(no_way(sigmas_left))?
-                .curvature;
+            let normal = squares.normal(&p, &groups).ok_or(no_way(sigmas_left))?;
             let way: Vec<f64> = next.iter().zip(&p).map(|(next, p)| next - p).collect();
-            let free = |step: &[f64]| {
-                groups
-                    .iter()
-                    .map(|group| step[group[0]])
-                    .collect::<Array1<f64>>()
-            };
-            let product = |a: &[f64], b: &[f64]| free(a).dot(&curvature.dot(&free(b)));
-            let share = averaged(&mut turns, product(&way, &last), product(&last, &last));
-            sigmas_left = share * (product(&way, &way) / alike).sqrt();
+            let step = free_numbers(&way, &groups);
+            let last_step = free_numbers(&last, &groups);
+            let curved = normal.curvature.dot(&last_step);
+            let share = averaged(&mut turns, step.dot(&curved), last_step.dot(&curved));
+            sigmas_left = share * (step.dot(&normal.curvature.dot(&step)) / alike).sqrt();
             if sigmas_left <= stop.sigmas {
                 // a core that shrank on the way, as where the pair was narrow, may show where it ends
-                if groups.len() < all.len() && !released {
+                if groups.len() < all.len() && !are_cores_released {
                     groups = all.to_vec();
-                    released = true;
+                    are_cores_released = true;
                     most = steps + stop.iterations;
                     continue;
                 }
@@ -355,6 +348,11 @@ fn averaged(turns: &mut u32, with_last: f64, of_last: f64) -> f64 {
 /// The first end that there is of a part of a step, its half, its quarter and so on.
 fn halved<T>(part: f64, end: impl Fn(f64) -> Option<T>) -> Option<T> {
     (0..=HALVINGS).find_map(|halving| end(part * 0.5_f64.powi(halving)))
+}
+
+/// A step of the free numbers, from that of all parameters.
+fn free_numbers(step: &[f64], groups: &[Vec<usize>]) -> Array1<f64> {
+    groups.iter().map(|group| step[group[0]]).collect()
 }
 
 /// Standard deviations of the velocities of cells over those in uniform wind, as their residuals tell: ln|r| is a straight line over ln(1 +
