@@ -127,9 +127,10 @@ def of_methods(zones, unit, function):
     told = []
     for ca in zones.cases("CA; chapter"):
         case = ca.removeprefix("CA; ")
+        pulse = case.rpartition(", ")[2]
         for pa in ("PA", "PA, Gaussian"):
             found = estimate(zones.batches(ca), lambda b: function(ca, b) - function(f"{pa}; {case}", b))
-            told.append(f"{case}, CA - {pa}: {words(found)}{unit}")
+            told.append(f"{pulse}, CA less {pa}: {words(found)}{unit}")
     return told
 
 
@@ -262,7 +263,7 @@ def f4c():
     pairs = list(zip(of["monostatic_1e-13"], of["monostatic_1e-15"]))
     a, b = max(pairs, key=lambda pair: difference(*pair)[0])
     db = 10.0 * math.log10(a["efficiency"] / b["efficiency"])
-    return [f"most at {a['range_m']:g} m: {words(difference(a, b))}, {db:.1f} dB"]
+    return [f"at {a['range_m']:g} m: {words(difference(a, b))}, {db:.1f} dB"]
 
 
 def f4d():
@@ -323,7 +324,7 @@ def f9b():
     here = sorted((r for r in rows("fig09") if abs(r["range_m"] - 400.0) < 1e-6), key=lambda r: r["rho_m"])
     unique = list({r["rho_m"]: r for r in here}.values())
     levels, n_eff = (", ".join(format(r[name], form) for r in unique) for name, form in (("level", ".0f"), ("n_eff", ".1f")))
-    return [f"{levels} (n_eff {n_eff})"]
+    return [f"{levels} (as good as {n_eff} independent ones)"]
 
 
 def f10():

@@ -18,6 +18,8 @@ pub(crate) struct Claim {
     pub(crate) measured: String,
     /// What else was measured.
     pub(crate) beside: String,
+    /// How many of its conditions hold, where it has several.
+    pub(crate) tally: String,
     /// NaN where the measurement is deterministic.
     pub(crate) standard_error: f64,
     pub(crate) verdict: Verdict,
@@ -95,6 +97,9 @@ struct Listed {
     /// Where the chapter's is judged, and what of that it does not say.
     #[serde(default)]
     case: String,
+    /// Why the verdict may say little about the chapter.
+    #[serde(default)]
+    reservation: String,
 }
 
 /// All captions and claims of figures.
@@ -119,6 +124,7 @@ impl Claim {
             expected: String::new(),
             measured,
             beside: String::new(),
+            tally: String::new(),
             standard_error: f64::NAN,
             verdict: Verdict::of(pass),
             decided_by: String::new(),
@@ -156,10 +162,16 @@ impl Claim {
         let verdict = judged
             .first()
             .map_or(Verdict::Open, |(verdict, _)| *verdict);
+        let hold = judged.iter().filter(|(v, _)| *v == Verdict::Pass).count();
+        let tally = match parts.len() {
+            0 | 1 => String::new(),
+            all => format!("{hold} of {all} conditions hold"),
+        };
         let measured: Vec<String> = judged.into_iter().map(|(_, words)| words).collect();
         let claim = Self {
             verdict,
             standard_error,
+            tally,
             ..Self::exact(id, measured.join("; "), false)
         };
         if verdict != Verdict::Open {
@@ -209,10 +221,21 @@ impl Claim {
         self.listed().map_or("", |listed| listed.case.as_str())
     }
 
+    /// What of the chapter's is measured.
+    pub(crate) fn label(&self) -> &'static str {
+        self.listed().map_or("", |listed| listed.label.as_str())
+    }
+
+    /// Why the verdict may say little about the chapter; mostly nothing.
+    pub(crate) fn reservation(&self) -> &'static str {
+        self.listed()
+            .map_or("", |listed| listed.reservation.as_str())
+    }
+
     /// What was measured in one phrase: of several parts the one that decides.
     pub(crate) fn value(&self) -> String {
         let decisive = self.measured.split("; ").next().unwrap_or("");
-        match self.listed().map_or("", |listed| listed.label.as_str()) {
+        match self.label() {
             "" => decisive.into(),
             label => format!("{label}: {decisive}"),
         }
@@ -289,6 +312,8 @@ mod tests {
             claim.measured,
             "p: 2.00 ± 0.10 m/s; p: 1.10 ± 0.10 m/s; p: 0.50 ± 0.10 m/s"
         );
+        assert_eq!(claim.tally, "1 of 3 conditions hold");
+        assert_eq!(of(&[0.9]).tally, "");
         assert_eq!(of(&[0.9]).decided_by, "about 3.8 times the data");
         assert_eq!(of(&[f64::NAN]).decided_by, "no sample in reach");
         assert_eq!(

@@ -38,7 +38,22 @@ pub(crate) struct Figure {
     pub(crate) title: &'static str,
     /// Processor time with the profile quick, about, on a slow core \[s\].
     pub(crate) quick_core_s: f64,
+    /// The row of panels that its thumbnail shows.
+    pub(crate) row: Row,
     pub(crate) make: Make,
+}
+
+/// One of several rows of panels of equal height.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Row {
+    /// From the top, from 0.
+    pub(crate) index: u32,
+    pub(crate) count: u32,
+}
+
+impl Row {
+    /// The whole picture.
+    pub(crate) const ALL: Self = Self { index: 0, count: 1 };
 }
 
 /// Which figures are drawn one after the other.
@@ -53,6 +68,14 @@ pub(crate) enum Lane {
 }
 
 impl Figure {
+    /// The figure with a row of panels as its thumbnail, the index from 0.
+    const fn with_row(self, index: u32, count: u32) -> Self {
+        Self {
+            row: Row { index, count },
+            ..self
+        }
+    }
+
     /// What it is, with the number by which `--only` selects it.
     pub(crate) fn numbered(&self) -> String {
         let kind = if self.id.starts_with("tab") {
@@ -118,6 +141,7 @@ const fn figure(
         number,
         title,
         quick_core_s,
+        row: Row::ALL,
         make,
     }
 }
@@ -166,7 +190,7 @@ pub(crate) const ALL: [Figure; 21] = [
         0.1,
         fig05::make,
     ),
-    figure("fig06", 6, "Surfaces of equal vorticity", 22.0, fig06::make),
+    figure("fig06", 6, "Surfaces of equal vorticity", 22.0, fig06::make).with_row(0, 2),
     figure(
         "fig07",
         7,
@@ -194,47 +218,53 @@ pub(crate) const ALL: [Figure; 21] = [
         "Estimation error and gradient",
         4.0,
         fig10::make,
-    ),
-    figure("fig11", 11, "Estimated map, late, 400 ns", 5.0, fig11::make),
-    figure("fig12", 12, "Error against pulse energy", 10.0, fig12::make),
+    )
+    .with_row(2, 3),
+    figure("fig11", 11, "Estimated map, late, 400 ns", 5.0, fig11::make).with_row(3, 5),
+    figure("fig12", 12, "Error against pulse energy", 10.0, fig12::make).with_row(1, 2),
     figure(
         "fig13",
         13,
         "Correlogram against periodogram accumulation",
         13.0,
         fig13_14::make_13,
-    ),
+    )
+    .with_row(2, 4),
     figure(
         "fig14",
         14,
         "Both accumulations in weak turbulence",
         10.0,
         fig13_14::make_14,
-    ),
-    figure("fig15", 15, "Error against run time", 14.0, fig15::make),
-    figure("fig16", 16, "Stiff and extreme cases", 20.0, fig16::make),
+    )
+    .with_row(1, 2),
+    figure("fig15", 15, "Error against run time", 14.0, fig15::make).with_row(0, 3),
+    figure("fig16", 16, "Stiff and extreme cases", 20.0, fig16::make).with_row(0, 6),
     figure(
         "fig17",
         17,
         "Circulation and positions from single scans",
         15.0,
         fig17::make,
-    ),
+    )
+    .with_row(0, 4),
     figure(
         "fig18",
         18,
         "Velocity estimators against the Cramer-Rao bound",
         5.0,
         fig18::make,
-    ),
+    )
+    .with_row(0, 3),
     figure("fig19", 19, "Detection of wakes", 10.5, fig19::make),
     figure(
         "fig25",
         25,
-        "Where correlogram accumulation errs less",
+        "Where correlogram accumulation errs less, and where more",
         14.0,
         fig25::make,
-    ),
+    )
+    .with_row(0, 3),
 ];
 
 #[cfg(test)]

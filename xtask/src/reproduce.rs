@@ -264,7 +264,7 @@ fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)], run_s: f6
     let of_chapter = report::Count::new(claims.iter().copied(), Kind::Chapter);
     let of_program = report::Count::new(claims.iter().copied(), Kind::Own);
     let hint = match (of_chapter.open, context.profile) {
-        (1.., Profile::Quick) => " (--profile standard decides)",
+        (1.., Profile::Quick) => " (--profile standard has more data)",
         _ => "",
     };
     say(&format!("Statements of the chapter: {of_chapter}{hint}"))?;

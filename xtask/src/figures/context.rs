@@ -76,6 +76,8 @@ impl Context {
 /// The error of correlogram accumulation relative to that of one periodogram accumulation on the same signals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Comparison {
+    /// Signal-to-noise ratio at the vortices, dB.
+    pub(crate) snr_db: f64,
     /// Duration of the pulse, in print.
     pub(crate) pulse: String,
     /// The periodogram accumulation.
@@ -97,7 +99,7 @@ pub(crate) struct Rendered {
     pub(crate) values: Vec<String>,
     /// Short notes beside the name, such as what is not the real thing.
     pub(crate) marks: Vec<String>,
-    /// Errors of correlogram and periodogram accumulation side by side, for the head of the report; mostly nothing.
+    /// Errors of correlogram and periodogram accumulation side by side, for the table of the report; mostly nothing.
     pub(crate) comparison: Vec<Comparison>,
     /// Claims measured on the data of the run.
     pub(crate) claims: Vec<Claim>,

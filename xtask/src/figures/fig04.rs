@@ -257,7 +257,7 @@ fn falling_claim(
     Claim::exact(
         "F4a",
         format!(
-            "{:.3} to {:.3}; largest distance {worst:.2} of the interval",
+            "{:.3} to {:.3}; the Monte Carlo is within {worst:.2} of its 95 % interval of the theory",
             ratio[0],
             ratio[ratio.len() - 1]
         ),
@@ -297,8 +297,13 @@ fn excess_claim(
     let above: Vec<usize> = (0..excess.len())
         .filter(|&i| is_sure(&excess[i], excess.len()) && excess[i].value > 0.0)
         .collect();
+    let sure = if above.contains(&largest) {
+        ""
+    } else {
+        ", but not surely above 0,"
+    };
     let most = format!(
-        "most at {} m: {}",
+        "largest{sure} at {} m: {}",
         range_m[largest],
         excess[largest].words()
     );
@@ -306,7 +311,7 @@ fn excess_claim(
         (Some(&first), Some(&last)) => {
             let db = 10.0 * (medium.mean[largest] / weak.mean[largest]).log10();
             format!(
-                "from {} to {} m; {most}, {db:.1} dB",
+                "surely from {} to {} m; {most}, {db:.1} dB",
                 range_m[first], range_m[last]
             )
         }

@@ -95,8 +95,8 @@ fn short_waves(wake: &FinishedWake) -> Result<Claim, Failure> {
     let first = modes.first().copied().unwrap_or(0);
     let last = modes.last().copied().unwrap_or(0);
     let measured = format!(
-        "modes {first} to {last} of the box, all together, grow at {rate:.2} per tau from 1 to 2; of the energy of modes 1 to 8 they hold \
-         {at_start:.2} at tau = 0, {at_1:.2} at 1 and {at_2:.2} at 2"
+        "waves of 0.2 to 0.6 b₀ (modes {first} to {last} of the box) grow at {rate:.2} per tau from 1 to 2; their fraction of the energy of \
+         all waves is {at_start:.2} at tau = 0, {at_1:.2} at 1 and {at_2:.2} at 2"
     );
     let claim = Claim::exact("F6b", measured, rate > 1.0 && at_2 > 0.75);
     let is_resolved = wake.flow.cells[0] as f64 / f64::from(last.max(1)) >= 4.0;

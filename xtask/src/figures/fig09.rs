@@ -134,6 +134,10 @@ fn chapter_claim(levels: &[Level; 3]) -> Claim {
     }
     let windows = levels.each_ref().map(|level| level.windows.to_string());
     let n_eff = levels.each_ref().map(|level| format!("{:.1}", level.n_eff));
-    let measured = format!("{} (n_eff {})", windows.join(", "), n_eff.join(", "));
+    let measured = format!(
+        "{} (as good as {} independent ones)",
+        windows.join(", "),
+        n_eff.join(", ")
+    );
     Claim::exact("F9b", measured, agrees)
 }

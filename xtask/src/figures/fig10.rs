@@ -38,7 +38,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         });
         let of_std = correlation(&study.map.std_m_s, &gradient);
         beside.push(format!(
-            "{name}: {}, of the standard deviation {of_std:.2}",
+            "{name}: {}, without the bias {of_std:.2}",
             of_rms.words()
         ));
         if name == "chapter" {

@@ -25,7 +25,10 @@ pub(super) fn make_13(context: &Context) -> Result<Rendered, Failure> {
         p.excess_m_s(&p.inside, without)
     });
     out.comparison = profiles::comparison(&chapter);
-    out.claims = vec![Claim::judged("F13", &parts)];
+    let along = profiles::parts(&chapter, " m/s", Profiles::near_core_m_s);
+    let along: Vec<String> = along.iter().map(Part::to_string).collect();
+    let along = format!("along the lines of the figure: {}", along.join("; "));
+    out.claims = vec![Claim::judged("F13", &parts).beside(&along)];
     Ok(out)
 }
 
@@ -88,7 +91,7 @@ fn compare(
     let many = if short == long {
         short.to_string()
     } else {
-        format!("{short} and {long}")
+        format!("{short} (200 ns) and {long} (400 ns)")
     };
     out.values = vec![many, few.to_string(), sight.words];
     out.marks = vec![sight.mark];
@@ -113,14 +116,13 @@ fn plots(durations_in_panel: usize, all: &[Profiles]) -> Vec<CurvePlot> {
     let mut plots = Vec::new();
     for shown in all.chunks(durations_in_panel * METHODS.len()) {
         let first = &shown[0];
-        let title = if durations_in_panel == 1 {
-            first.title()
-        } else {
-            format!(
-                "{} signal-to-noise ratio, {:.1} dB",
-                first.name, first.snr_db
-            )
-        };
+        let mut title = format!(
+            "{} signal-to-noise ratio, {:.1} dB",
+            first.name, first.snr_db
+        );
+        if durations_in_panel == 1 {
+            title += &format!("; pulses of {:.0} ns", 1e9 * first.pulse_s);
+        }
         plots.push(profiles::plot(&title.replace(" -", " −"), shown));
     }
     plots

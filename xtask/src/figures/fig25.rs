@@ -1,7 +1,7 @@
 //! Figure 25, beyond the chapter: where correlogram accumulation errs less than periodogram accumulation, and where not.
 
 use super::context::*;
-use super::profiles::Profiles;
+use super::profiles::{self, Profiles};
 use super::study::{EARLY_TAU, METHODS, Sight, Study, Zone, batches, near_scene, with_method};
 use wakescope_sim::scene::{NoiseModel, Refinement, VortexPair};
 
@@ -205,6 +205,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     out.add("batches.csv", &batches(&zones), &origin)?;
     out.values = vec![scans.to_string(), sight.words];
     out.marks = vec![sight.mark, "analytic pair".into()];
+    for snr_db in [WEAK_DB, STRONG_DB] {
+        let measured = find(&all, at(WAKE, snr_db))?;
+        out.comparison.extend(profiles::comparison(&measured.of));
+    }
     out.claims = claims(&all)?;
     Ok(out)
 }
@@ -288,25 +292,26 @@ fn picture(all: &[Measured]) -> Figure {
         .collect();
     let cores = [("pair, band noise, one pulse a line".into(), cores)];
     let by_snr = |case: &Case| case.snr_db;
-    let x = "SNR [dB]";
-    let in_vortices = panel("Inside the vortices", x, inside, by_snr, &along);
-    let beyond = panel("Outside", x, outside, by_snr, &along);
+    // Points at the weakest and the strongest signal stay clear of the frame.
+    let snr = || Axis::linear("signal-to-noise ratio [dB]").between(WEAK_DB - 1.5, STRONG_DB + 1.5);
+    let in_vortices = panel("Inside the vortices", snr(), inside, by_snr, &along);
+    let beyond = panel("Outside", snr(), outside, by_snr, &along);
     let title = format!("Inside the vortices of the pair, {CHAPTER_DB} dB");
-    let x = "core radius [b₀]";
-    let by_core = panel(&title, x, inside, Case::core_b0, &cores);
+    let core = Axis::linear("core radius [b₀]");
+    let by_core = panel(&title, core, inside, Case::core_b0, &cores);
     Figure::stacked([in_vortices, beyond, by_core])
 }
 
 /// CA less each PA over the latter, against a number of the cases.
 fn panel(
     title: &str,
-    label: &str,
+    x: Axis,
     region: Region,
     number: fn(&Case) -> f64,
     curves: &[Curve],
 ) -> CurvePlot {
     let y = Axis::linear("(CA − PA)/PA").between(-0.8, 1.6);
-    let mut plot = CurvePlot::new(title, Axis::linear(label), y);
+    let mut plot = CurvePlot::new(title, x, y);
     for (colour, (name, of)) in curves.iter().enumerate() {
         for (pa, style) in [(0, Style::LineMarkers), (1, Style::Dash)] {
             let mut points = Vec::new();

@@ -106,6 +106,17 @@ impl Profiles {
             .collect()
     }
 
+    /// Its mean within [`INSIDE_M`] of a centre along those lines.
+    pub(super) fn near_core_m_s(&self, without: Option<usize>) -> f64 {
+        let mut near = Vec::new();
+        for (range_m, value) in self.across_m_s(without) {
+            if range_m.abs() <= INSIDE_M {
+                near.push(value);
+            }
+        }
+        near.iter().sum::<f64>() / near.len() as f64
+    }
+
     /// The zones of a named case that claims are about.
     pub(super) fn regions(&self, case: &str) -> [NamedZone<'_>; 2] {
         let case = format!("{}; {case}", self.method);
@@ -207,7 +218,7 @@ pub(super) fn parts(
             continue;
         };
         for pa in pas {
-            let name = format!("{}, CA - {}", pa.title(), pa.method);
+            let name = format!("{:.0} ns, CA less {}", 1e9 * pa.pulse_s, pa.method);
             let bar = Bar::Less(NO_DIFFERENCE * number(pa, None).abs());
             parts.push(Part::new(name, ca.less(pa, number), unit, bar));
         }
@@ -224,10 +235,11 @@ pub(super) fn comparison(all: &[Profiles]) -> Vec<Comparison> {
         };
         for pa in pas {
             comparison.push(Comparison {
+                snr_db: pa.snr_db,
                 pulse: format!("{:.0} ns", 1e9 * pa.pulse_s),
                 against: match pa.method {
-                    "PA" => "unweighted".into(),
-                    _ => "Gaussian weighting".into(),
+                    "PA" => "PA, unweighted".into(),
+                    _ => "PA, Gaussian weighting".into(),
                 },
                 inside: ca.inside.over(&pa.inside),
                 outside: ca.outside.over(&pa.outside),
@@ -271,7 +283,7 @@ pub(super) fn table(all: &[Profiles]) -> Table {
 /// Curves of some profiles, less their evolution with range.
 pub(super) fn plot(title: &str, profiles: &[Profiles]) -> CurvePlot {
     let x = Axis::linear("range from the vortex centre [m]");
-    let y = Axis::linear("rms less its evolution [m/s]");
+    let y = Axis::linear("error above that outside [m/s]");
     let mut plot = CurvePlot::new(title, x, y);
     for (place, p) in profiles.iter().enumerate() {
         let style = [Style::Line, Style::Dash, Style::DashDot][place % METHODS.len()];

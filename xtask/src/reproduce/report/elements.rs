@@ -1,5 +1,6 @@
 //! Elements of the page: signs as in print, badges, tables, pictures and their thumbnails.
 
+use crate::figures::Row;
 use fixtures::failure::Failure;
 use wakescope_sim::plot::escape;
 
@@ -140,19 +141,18 @@ fn table_of_csv(id: &str, csv: &str) -> Result<String, Failure> {
     table(id, &header, &cells)
 }
 
-/// Rows and columns of a table that its thumbnail shows, and the letters of a cell.
-const THUMBNAIL_CELLS: [usize; 3] = [5, 2, 19];
+/// Rows of a table that its thumbnail shows, and of each of its columns the start and the most letters.
+const THUMBNAIL_ROWS: usize = 5;
+const THUMBNAIL_COLUMNS: [(u32, usize); 2] = [(10, 23), (222, 11)];
 
 /// The first cells of a CSV file as a small picture.
 fn thumbnail_of_csv(csv: &str) -> String {
     let (names, rows) = rows_of(csv);
-    let [most_rows, most_columns, letters] = THUMBNAIL_CELLS;
     let mut text = String::new();
-    let lines = std::iter::once(&names).chain(&rows).take(most_rows);
+    let lines = std::iter::once(&names).chain(&rows).take(THUMBNAIL_ROWS);
     for (line, cells) in lines.enumerate() {
-        for (column, cell) in cells.iter().take(most_columns).enumerate() {
+        for (cell, (x, letters)) in cells.iter().zip(THUMBNAIL_COLUMNS) {
             let shown: String = cell.chars().take(letters).collect();
-            let x = 10 + 185 * column;
             let y = 26 + 42 * line;
             text += &format!("<text x=\"{x}\" y=\"{y}\">{}</text>", escape(&shown));
         }
@@ -221,21 +221,23 @@ impl<'s> Picture<'s> {
         }
     }
 
-    /// The same once more and small, a high drawing cut to its upper part; the link about it has the words.
-    pub(super) fn thumbnail(&self) -> String {
+    /// A row of its panels once more and small; the link about it has the words.
+    pub(super) fn thumbnail(&self, row: Row) -> String {
         let (id, view_box) = match self {
             Self::Drawing { id, view_box, .. } => (id, view_box),
             Self::Rows { csv, .. } => return thumbnail_of_csv(csv),
         };
         let size: Vec<f64> = view_box.split(' ').flat_map(str::parse).collect();
-        let is_wide = matches!(size[..], [_, _, width, height] if width > 1.6 * height);
-        let fit = if is_wide {
-            "xMidYMid meet"
-        } else {
-            "xMidYMin slice"
+        let view_box = match size[..] {
+            [x, y, width, height] => {
+                let height = height / f64::from(row.count);
+                let y = y + f64::from(row.index) * height;
+                format!("{x} {y} {width} {height}")
+            }
+            _ => view_box.to_string(),
         };
         format!(
-            "<svg viewBox=\"{view_box}\" preserveAspectRatio=\"{fit}\" aria-hidden=\"true\"><use href=\"#picture-{id}\"/></svg>"
+            "<svg viewBox=\"0 0 8 5\" aria-hidden=\"true\"><svg viewBox=\"{view_box}\"><use href=\"#picture-{id}\"/></svg></svg>"
         )
     }
 }
@@ -267,9 +269,10 @@ mod tests {
         let full = picture.full("a <b>").unwrap();
         assert!(full.contains("<g id=\"picture-fig01\"><rect/></g>"));
         assert!(full.contains("aria-label=\"a &lt;b&gt;\""));
-        let thumbnail = picture.thumbnail();
+        let thumbnail = picture.thumbnail(Row::ALL);
         assert!(thumbnail.contains("viewBox=\"0 0 2 1\"") && !thumbnail.contains("<rect"));
-        assert!(thumbnail.contains("meet"));
+        let lower = picture.thumbnail(Row { index: 1, count: 2 });
+        assert!(lower.contains("viewBox=\"0 0.5 2 0.5\""), "{lower}");
         assert!(Picture::new("fig01", "<svg><script></svg>").is_err());
     }
 
