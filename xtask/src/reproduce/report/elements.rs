@@ -141,6 +141,8 @@ fn table_of_csv(id: &str, csv: &str) -> Result<String, Failure> {
     table(id, &header, &cells)
 }
 
+/// Width and height of a thumbnail.
+const THUMBNAIL_SIZE: [f64; 2] = [320.0, 200.0];
 /// Rows of a table that its thumbnail shows, and of each of its columns the start and the most letters.
 const THUMBNAIL_ROWS: usize = 5;
 const THUMBNAIL_COLUMNS: [(u32, usize); 2] = [(10, 23), (222, 11)];
@@ -153,11 +155,11 @@ fn thumbnail_of_csv(csv: &str) -> String {
     for (line, cells) in lines.enumerate() {
         for (cell, (x, letters)) in cells.iter().zip(THUMBNAIL_COLUMNS) {
             let shown: String = cell.chars().take(letters).collect();
-            let y = 26 + 42 * line;
+            let y = 26 + 40 * line;
             text += &format!("<text x=\"{x}\" y=\"{y}\">{}</text>", escape(&shown));
         }
     }
-    format!("<svg viewBox=\"0 0 320 213\" aria-hidden=\"true\" class=\"cells\">{text}</svg>")
+    format!("<svg viewBox=\"0 0 320 200\" aria-hidden=\"true\" class=\"cells\">{text}</svg>")
 }
 
 /// What a figure shows.
@@ -228,16 +230,19 @@ impl<'s> Picture<'s> {
             Self::Rows { csv, .. } => return thumbnail_of_csv(csv),
         };
         let size: Vec<f64> = view_box.split(' ').flat_map(str::parse).collect();
-        let view_box = match size[..] {
-            [x, y, width, height] => {
-                let height = height / f64::from(row.count);
-                let y = y + f64::from(row.index) * height;
-                format!("{x} {y} {width} {height}")
-            }
-            _ => view_box.to_string(),
+        let [left, top, width, all_height] = size[..] else {
+            return String::new();
         };
+        let height = all_height / f64::from(row.count);
+        let top = top + f64::from(row.index) * height;
+        // As large as fits, and cut at its own border, beyond which the other rows are.
+        let scale = (THUMBNAIL_SIZE[0] / width).min(THUMBNAIL_SIZE[1] / height);
+        let [shown_width, shown_height] = [scale * width, scale * height];
+        let x = 0.5 * (THUMBNAIL_SIZE[0] - shown_width);
+        let y = 0.5 * (THUMBNAIL_SIZE[1] - shown_height);
         format!(
-            "<svg viewBox=\"0 0 8 5\" aria-hidden=\"true\"><svg viewBox=\"{view_box}\"><use href=\"#picture-{id}\"/></svg></svg>"
+            "<svg viewBox=\"0 0 320 200\" aria-hidden=\"true\"><svg x=\"{x}\" y=\"{y}\" width=\"{shown_width}\" height=\"{shown_height}\" \
+             viewBox=\"{left} {top} {width} {height}\"><use href=\"#picture-{id}\"/></svg></svg>"
         )
     }
 }
