@@ -4,6 +4,8 @@
 //! [`Estimator`] turns such a mean into a velocity. Accumulation stands between the two and knows neither.
 //! Check: the mean over a region equals the mean of the statistics of its windows.
 
+use ndarray::Array2;
+
 use crate::error::{Error, length};
 use crate::estimators::{GateVelocity, Quality};
 use crate::window::missing::MissingRule;
@@ -20,6 +22,15 @@ pub trait Statistic<S: Sample>: Sync {
     /// The caller passes exactly [`Statistic::window_samples`] finite samples, scaled to order one,
     /// and [`Statistic::statistic_len`] places. The result must be quadratic in the samples.
     fn evaluate(&self, window: &[S], scratch: &mut Scratch, out: &mut [f64]);
+
+    /// Weights w(k, m) with which the numbers follow from products of samples: number m is
+    /// sum over k of w(k, m) s(k+m) conj(s(k)), a real number or its two parts. So windows of many
+    /// records can be averaged from the sums of their products.
+    ///
+    /// `None`, as here, if the numbers are not such sums: they are then computed of each record.
+    fn product_weights(&self) -> Option<Array2<f64>> {
+        None
+    }
 
     /// Hands the numbers of all valid windows of a record, `step_samples` apart, to `each` with the index of the window.
     ///

@@ -8,6 +8,8 @@
 
 use std::marker::PhantomData;
 
+use ndarray::Array2;
+
 use crate::error::{Error, length, not_empty, positive};
 use crate::estimators::Statistic;
 use crate::spectrum::transform::WindowTransform;
@@ -133,5 +135,17 @@ impl<S: Sample> Statistic<S> for Correlogram<S> {
             self.transform.add_power(weighted, taper.factor, scratch);
         }
         self.transform.lags_of_power(scratch, out);
+    }
+
+    fn product_weights(&self) -> Option<Array2<f64>> {
+        let mut products = Array2::zeros((self.lags(), self.lags()));
+        for Taper { weights: h, factor } in &self.tapers {
+            for (k, behind) in h.iter().enumerate() {
+                for (m, ahead) in h[k..].iter().enumerate() {
+                    products[(k, m)] += factor * ahead * behind;
+                }
+            }
+        }
+        Some(products)
     }
 }

@@ -8,6 +8,8 @@
 
 use std::marker::PhantomData;
 
+use ndarray::Array2;
+
 use crate::error::{Error, check};
 use crate::estimators::Statistic;
 use crate::spectrum::correlogram::unweighted_lags;
@@ -90,6 +92,13 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
             let mean = products.sum::<num_complex::Complex<f64>>() * factor;
             parts.copy_from_slice(&[mean.re, mean.im][..parts.len()]);
         }
+    }
+
+    fn product_weights(&self) -> Option<Array2<f64>> {
+        let n = self.window_samples;
+        Some(Array2::from_shape_fn((n, self.lags), |(k, m)| {
+            if k + m < n { 1.0 / n as f64 } else { 0.0 }
+        }))
     }
 
     fn evaluate_record(

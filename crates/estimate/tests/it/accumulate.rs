@@ -605,3 +605,103 @@ fn automatic_radius_is_the_smallest_that_reaches_the_target() {
             .is_err()
     );
 }
+
+/// Products of the samples of two lines with four rays each, `[line][sample, lag]`.
+fn products_of<S: Sample>(records: &Array2<S>, lags: usize) -> Vec<Array2<S>> {
+    let mut lines = Vec::new();
+    for rays in records.axis_chunks_iter(Axis(0), 4) {
+        lines.push(Array2::from_shape_fn((SAMPLES, lags), |(k, lag)| {
+            let mut sum = Complex::new(0.0, 0.0);
+            for record in rays.rows() {
+                if k + lag < SAMPLES {
+                    sum += record[k + lag].to_complex() * record[k].to_complex().conj();
+                }
+            }
+            S::from_complex(sum)
+        }));
+    }
+    lines
+}
+
+/// The largest difference of the means of regions from records and from their products.
+fn products_deviation<S: Sample>(statistic: &dyn Statistic<S>, records: &Array2<S>) -> f64 {
+    let geometry = || {
+        let lines_rad = [0.0, 0.01];
+        ScanGeometry::regular(&table_2(), &gates(), &lines_rad, 4, SAMPLES).unwrap()
+    };
+    let mut of_records = ScanSums::new(statistic, &gates(), geometry(), SAMPLES).unwrap();
+    of_records.add(0, records.view()).unwrap();
+    let of_records = of_records.finish();
+    let mut of_products = ScanSums::new(statistic, &gates(), geometry(), SAMPLES).unwrap();
+    for (line, products) in products_of(records, 70).iter().enumerate() {
+        of_products
+            .add_products(line, std::slice::from_ref(products))
+            .unwrap();
+    }
+    let of_products = of_products.finish();
+    let mut means = [(); 2].map(|()| vec![0.0; statistic.statistic_len()]);
+    let mut largest = 0.0_f64;
+    for (range_m, radius_m) in [(340.0, 0.4), (400.0, 5.0), (430.0, 30.0)] {
+        let point = PolarPoint::at_elevation(range_m, 0.008);
+        let levels = [&of_records, &of_products]
+            .into_iter()
+            .zip(&mut means)
+            .map(|(scan, mean)| scan.region_mean(point, radius_m, mean).unwrap());
+        let levels: Vec<usize> = levels.collect();
+        assert_eq!(levels[0], levels[1]);
+        for (a, b) in means[0].iter().zip(&means[1]) {
+            let error = a * of_records.scale().powi(2) - b * of_products.scale().powi(2);
+            largest = largest.max(error.abs());
+        }
+    }
+    largest
+}
+
+#[test]
+fn sums_of_products_give_what_their_records_give() {
+    let real = noise_records(21);
+    let imaginary = noise_records(22);
+    let both = ndarray::Zip::from(&real)
+        .and(&imaginary)
+        .map_collect(|re, im| Complex::new(*re, *im));
+    let tapers = vec![
+        Taper::unit(Weighting::default().weights(64).unwrap()).unwrap(),
+        Taper::unit((0..64).map(|k| f64::from(k) - 31.5).collect()).unwrap(),
+    ];
+    let deviations = [
+        products_deviation(
+            &Correlogram::<f64>::with_tapers(tapers.clone()).unwrap(),
+            &real,
+        ),
+        products_deviation(&ShortCorrelogram::<f64>::new(64, 17).unwrap(), &real),
+        products_deviation(
+            &Correlogram::<Complex<f64>>::with_tapers(tapers).unwrap(),
+            &both,
+        ),
+        products_deviation(
+            &ShortCorrelogram::<Complex<f64>>::new(64, 17).unwrap(),
+            &both,
+        ),
+    ];
+    assert!(deviations.iter().all(|d| *d < 1e-12), "{deviations:?}");
+}
+
+#[test]
+fn products_that_do_not_fit_are_refused() {
+    let statistic = plan().statistic;
+    let geometry = ScanGeometry::regular(&table_2(), &gates(), &[0.0], 4, SAMPLES).unwrap();
+    let mut sums = ScanSums::new(&statistic, &gates(), geometry, SAMPLES).unwrap();
+    let few_lags = sums.add_products(0, &[Array2::zeros((SAMPLES, 63))]);
+    assert!(
+        few_lags
+            .unwrap_err()
+            .to_string()
+            .contains("lags of the products")
+    );
+    assert!(
+        sums.add_products(0, &[Array2::zeros((SAMPLES - 1, 64))])
+            .is_err()
+    );
+    let too_many = vec![Array2::zeros((SAMPLES, 64)); 2];
+    assert!(sums.add_products(0, &too_many).is_err());
+}

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use ndarray::ArrayView2;
+use ndarray::{Array2, ArrayView2};
 
 use super::{BLOCK, Scan, add};
 use crate::error::{Error, check, length};
@@ -16,7 +16,7 @@ use crate::estimators::Statistic;
 use crate::map::ScanGeometry;
 use crate::parallel::{for_each_chunk, map_each};
 use crate::window::missing::{MissingRule, invalid_windows};
-use crate::window::{Gates, Sample, Scratch};
+use crate::window::{Gates, Sample, Scratch, SignalKind};
 
 /// Statistics of the windows of those records of a scan that have been added.
 ///
@@ -160,9 +160,74 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         Ok(())
     }
 
+    /// Adds all records of the lines from `first_line` on by the sums of their products: element
+    /// (k, m) of a line is the sum of s(k+m) conj(s(k)) over its rays, with as many lags m as the
+    /// statistic has in [`Statistic::product_weights`] or more.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for products of another number of samples or too few lags;
+    /// [`Error::OutOfRange`] if the statistic has no weights of products, or for lines that the scan
+    /// does not have.
+    pub fn add_products(&mut self, first_line: usize, products: &[Array2<S>]) -> Result<(), Error> {
+        let weights = self.statistic.product_weights();
+        let allowed = "a statistic that is a sum of products of samples";
+        check("product_weights", f64::NAN, allowed, weights.is_some())?;
+        let weights = weights.unwrap_or_default();
+        let last_line = first_line + products.len();
+        let allowed = "at most the number of lines of the scan";
+        check(
+            "lines",
+            last_line as f64,
+            allowed,
+            last_line <= self.geometry.lines(),
+        )?;
+        for line in products {
+            length("samples of the products", self.record_samples, line.nrows())?;
+            check(
+                "lags of the products",
+                line.ncols() as f64,
+                "those of the statistic or more",
+                line.ncols() >= weights.ncols(),
+            )?;
+        }
+        let largest = self.largest_root_mean_square(first_line, products);
+        let scale = self.rescale_to(self.rule.binary_scale(std::iter::once(largest)));
+        let weights = weights * scale.powi(-2);
+        let numbers = self.numbers;
+        let step = self.gates.step_samples;
+        let line_numbers = self.held.len() * numbers;
+        let rows = &mut self.rows[first_line * line_numbers..][..products.len() * line_numbers];
+        for_each_chunk(
+            rows,
+            line_numbers,
+            || (),
+            |(), line, chunk| {
+                for (gate, sums) in chunk.chunks_mut(numbers).enumerate() {
+                    add_window_products(&products[line], gate * step, &weights, sums);
+                }
+            },
+        );
+        Ok(())
+    }
+
+    /// Largest root mean square of a sample of some lines.
+    fn largest_root_mean_square(&self, first_line: usize, products: &[Array2<S>]) -> f64 {
+        let mut largest = 0.0_f64;
+        for (line, products) in (first_line..).zip(products) {
+            let rays = self.geometry.rays.count(line) as f64;
+            for power in products.column(0) {
+                largest = largest.max(power.to_complex().re / rays);
+            }
+        }
+        largest.sqrt()
+    }
+
     /// The scale for these records and the earlier ones, to which the sums are converted.
     fn rescale(&mut self, records: ArrayView2<'_, S>) -> f64 {
-        let here = self.rule.binary_scale(records.iter().copied());
+        self.rescale_to(self.rule.binary_scale(records.iter().copied()))
+    }
+
+    fn rescale_to(&mut self, here: Option<f64>) -> f64 {
         let scale = match (self.scale, here) {
             (Some(before), Some(here)) if here > before => {
                 let factor = (before / here).powi(2);
@@ -220,6 +285,34 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
             counts,
             invalid,
             scale: scale.unwrap_or(1.0),
+        }
+    }
+}
+
+/// Adds the numbers of the window that begins at a sample, of all records together.
+fn add_window_products<S: Sample>(
+    products: &Array2<S>,
+    first_sample: usize,
+    weights: &Array2<f64>,
+    sums: &mut [f64],
+) {
+    let window = weights.nrows();
+    for (k, weights) in weights.rows().into_iter().enumerate() {
+        let row = products.row(first_sample + k);
+        let lags = row.iter().zip(weights).take(window - k);
+        match S::KIND {
+            SignalKind::Real => {
+                for (sum, (product, weight)) in sums.iter_mut().zip(lags) {
+                    *sum += product.to_complex().re * weight;
+                }
+            }
+            SignalKind::Complex => {
+                for (sum, (product, weight)) in sums.as_chunks_mut::<2>().0.iter_mut().zip(lags) {
+                    let product = product.to_complex() * *weight;
+                    sum[0] += product.re;
+                    sum[1] += product.im;
+                }
+            }
         }
     }
 }
