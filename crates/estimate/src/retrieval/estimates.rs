@@ -3,8 +3,9 @@
 //! Check: circulations of maps of a pair within their standard errors; pairs in narrow sectors; empty scans.
 
 use crate::error::Error;
-use crate::retrieval::fit::{ScanEstimator, ScanFit};
-use crate::retrieval::{Flag, Movement, RetrievalOptions, ScanMap, ScanResult, VortexResult};
+use crate::retrieval::{
+    Flag, Movement, RetrievalOptions, ScanEstimator, ScanFit, ScanMap, ScanResult, VortexResult,
+};
 use crate::vortex_fit::map_fit::data::ends;
 use crate::vortex_fit::{
     EstimatorResponse, MapFit, MapFitOptions, VelocityMap, Wake, fit_map_of_estimator,

@@ -11,48 +11,11 @@ use crate::error::Error;
 use crate::retrieval::estimates::fit_estimates;
 use crate::retrieval::gate_means::fit_means;
 use crate::retrieval::secondary::with_secondary_vortices;
-use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult};
-use crate::vortex_fit::{EstimatorResponse, Sharing, WakeModel};
+use crate::retrieval::{Flag, RetrievalOptions, ScanFit, ScanMap, ScanResult, Velocities};
+use crate::vortex_fit::Sharing;
 
 /// Gates that share most of their window are skipped unless fewer velocities are left.
 const ENOUGH: usize = 500;
-
-/// The estimator that made the velocities of a scan.
-pub trait ScanEstimator {
-    /// What it makes of a wake about a range \[m\]; nothing if there is no such model of it.
-    fn response(&self, range_m: f64) -> Option<EstimatorResponse<'_>>;
-
-    /// Neighbouring lines, `spacing_rad` apart, that share windows at a range \[m\].
-    fn correlated_lines(&self, spacing_rad: f64, range_m: f64) -> usize;
-
-    /// Every Nth gate at those ranges \[m\] is independent: neighbours that share most of their window show the same.
-    fn gate_stride(&self, range_m: &[f64]) -> usize;
-
-    /// Half the length of a window along the line \[m\]: the outermost gates observe that much beyond their middles.
-    fn half_window_m(&self) -> f64;
-}
-
-/// What the velocities of a map are of the wind in its gates.
-#[derive(Clone, Copy)]
-pub enum Velocities<'e> {
-    /// Means with the weight of [`RetrievalOptions::gate`].
-    Means,
-    /// Unknown: they are taken for means, which the flag [`Flag::TakenForMeans`] says.
-    Unknown,
-    /// Estimates of a known estimator.
-    Estimates(&'e dyn ScanEstimator),
-    /// Most likely estimates of such an estimator: the difference to a fit of means counts as an error.
-    LikelyEstimates(&'e dyn ScanEstimator),
-}
-
-/// Outcome of the fit of a scan.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ScanFit {
-    /// What was found.
-    pub result: ScanResult,
-    /// The model that was fitted: that of the options, with the secondary vortices beside a pair if they were.
-    pub model: WakeModel,
-}
 
 /// Finds the vortices of one scan. No wake is a result, not an error.
 ///

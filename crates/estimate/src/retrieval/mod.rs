@@ -2,7 +2,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `scan_map`, `options`, `result` | what goes in, how, what comes out |
+//! | `scan_map`, `velocities`, `options`, `result` | what goes in, how, what comes out |
 //! | `fit` | [`fit_scan`], whatever the velocities are |
 //! | `gate_means`, `hypotheses`, `report` | fits of means: of wind alone, one vortex and two; which it is; deviations and flags |
 //! | `estimates` | the fit to what an estimator of this crate makes of a wake |
@@ -44,16 +44,18 @@ mod result;
 mod scan_map;
 mod secondary;
 mod track;
+mod velocities;
 mod whitening;
 
 pub use crate::vortex_fit::Top;
 pub use envelope::{EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelopes};
-pub use fit::{ScanEstimator, ScanFit, Velocities, fit_scan};
+pub use fit::fit_scan;
 pub use gates::expected_velocities;
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use plausible::without_implausible_vortices;
 pub use radial_velocity::radial_velocity_method;
-pub use result::{Flag, ScanResult, Side, VortexResult};
+pub use result::{Flag, ScanFit, ScanResult, Side, VortexResult};
 pub use scan_map::ScanMap;
 pub use track::{Track, TrackPoint, TrackedVortex, track};
+pub use velocities::{ScanEstimator, Velocities};
 pub(crate) use whitening::Whitening;

@@ -10,13 +10,11 @@ use crate::linalg::positive_definite::solve;
 use crate::retrieval::hypotheses::{End, Kind, Stage, best, least, tops};
 use crate::retrieval::{Covariance, Flag, ScanResult, Side, VortexResult};
 use crate::vortex_fit::map_fit::least_squares::{Scores, Uncertainty};
-use crate::vortex_fit::tolerances::{COMPETES, NOT_CONVERGED_SIGMAS};
+use crate::vortex_fit::tolerances::{CERTAIN_SIGMAS, COMPETES, NOT_CONVERGED_SIGMAS};
 use crate::vortex_fit::{Parameter, Top, Wake};
 
 /// Velocities with larger residuals, in their deviations, are outliers.
 pub(crate) const OUTLIER: f64 = 4.0;
-/// A vortex whose circulation is less than so many of its deviations may be none.
-pub(crate) const CERTAIN_SIGMAS: f64 = 3.0;
 /// So many times the root of the threshold is far beyond doubt in correlated noise too.
 const BY_FAR: f64 = 2.0;
 /// A side of a vortex is seen if the sector reaches so far beyond its centre \[m\], where circulation begins to be counted.

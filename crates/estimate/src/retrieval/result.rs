@@ -4,8 +4,7 @@ use ndarray::Array2;
 
 use crate::Measured;
 use crate::retrieval::ScanMap;
-use crate::retrieval::report::CERTAIN_SIGMAS;
-use crate::vortex_fit::tolerances::COMPETES;
+use crate::vortex_fit::tolerances::{CERTAIN_SIGMAS, COMPETES};
 use crate::vortex_fit::wake::motion::Motion;
 use crate::vortex_fit::{PARAMETERS, Parameter, Top, Wake, WakeModel};
 
@@ -322,4 +321,13 @@ impl ScanResult {
         let moves = !self.has(Flag::MotionIgnored);
         *self = self.with_wake(map, model, (wake, covariance), self.tops.clone(), moves);
     }
+}
+
+/// Outcome of the fit of a scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanFit {
+    /// What was found.
+    pub result: ScanResult,
+    /// The model that was fitted: that of the options, with the secondary vortices beside a pair if they were.
+    pub model: WakeModel,
 }

@@ -5,9 +5,8 @@
 use ndarray::Array2;
 
 use crate::error::Error;
-use crate::retrieval::fit::ScanFit;
 use crate::retrieval::gate_means::{MOST, fit_means};
-use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, VortexResult};
+use crate::retrieval::{Flag, RetrievalOptions, ScanFit, ScanMap, ScanResult, VortexResult};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::{MapFitOptions, Parameter};
