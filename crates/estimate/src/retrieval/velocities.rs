@@ -22,9 +22,9 @@ pub trait ScanEstimator {
 /// What the velocities of a map are of the wind in its gates.
 #[derive(Clone, Copy)]
 pub enum Velocities<'e> {
-    /// Means with the weight of [`RetrievalOptions::gate`].
+    /// Means with the weight of [`RetrievalOptions::gate`](super::RetrievalOptions::gate).
     Means,
-    /// Unknown: they are taken for means, which the flag [`Flag::TakenForMeans`] says.
+    /// Unknown: they are taken for means, which the flag [`Flag::TakenForMeans`](super::Flag::TakenForMeans) says.
     Unknown,
     /// Estimates of a known estimator.
     Estimates(&'e dyn ScanEstimator),

@@ -230,7 +230,7 @@ fn fits(scene: &Scene, records: &RawRecords) -> Result<(), Error> {
     Ok(())
 }
 
-/// Estimates the velocities of all records, through a plan of [`plan`].
+/// Estimates the velocities of all records, with the plan of the scene of [`scene_of_records`] and whether that is their own.
 ///
 /// # Errors
 /// What the system says of the file; records without any number; angles and times that do not fit.
