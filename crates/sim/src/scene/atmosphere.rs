@@ -139,7 +139,8 @@ impl Atmosphere {
         let mut range_m = profile.range_m.clone();
         let mut backscatter_per_m_sr = profile.backscatter_per_m_sr.clone();
         let mut extinction_per_m = profile.extinction_per_m.clone();
-        if range_m.is_empty() {
+        let count = range_m.len();
+        if count == 0 || backscatter_per_m_sr.len() != count || extinction_per_m.len() != count {
             return Medium::new(range_m, backscatter_per_m_sr, extinction_per_m);
         }
         // Beyond the table the air is as at its end, as far as a second-trip echo at the slowest

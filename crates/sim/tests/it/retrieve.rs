@@ -739,7 +739,7 @@ fn what_is_no_map_is_refused_and_nothing_is_written() {
             "masked.csv",
             &["masked.csv", "all of its velocities are missing"],
         ),
-        ("word.csv", &["word.csv", "row 8", "no number"]),
+        ("word.csv", &["word.csv", "row 8", "not a number"]),
         ("fill.csv", &["fill.csv", "-9999", "fill value"]),
         ("twice.csv", &["twice.csv", "row 101", "twice", "sweep"]),
         ("line.csv", &["line.csv", "1 different elevations", "RHI"]),
