@@ -136,7 +136,14 @@ impl HillAndrews {
     /// # Errors
     /// [`Error::OutOfRange`] for L0 <= 0, l0 <= 0, not a number, or kappa_0 >= 3.3/l0.
     pub fn new(scales: Scales) -> Result<Self, Error> {
-        positive("inner_scale_m", scales.inner_scale_m)?;
+        let l0_m = scales.inner_scale_m;
+        let allowed = "a finite number above 0: the bump of this spectrum is at the inner scale";
+        within(
+            "inner_scale_m",
+            l0_m,
+            l0_m.is_finite() && l0_m > 0.0,
+            allowed,
+        )?;
         let (outer_rad_m, inner_rad_m) = scales.wavenumbers_rad_m(3.3)?;
         Ok(Self {
             outer_rad_m,
