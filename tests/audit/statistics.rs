@@ -435,6 +435,17 @@ fn estimates_of(s: &Scene, column: &str, map: &Csv) -> f64 {
         * s.f("scan.realisations")
 }
 
+/// Whether some but fewer than 20 estimates of a map are flagged, or a part of it has fewer than 16.
+fn has_rough_errors(s: &Scene, map: &Csv) -> bool {
+    let flags = map.f("flagged");
+    let flagged = (flags.iter().sum::<f64>() * s.f("scan.realisations")).round();
+    let has_few = |column: &&str| {
+        let estimates = estimates_of(s, column, map);
+        estimates > 0.0 && estimates < 16.0
+    };
+    (flagged > 0.0 && flagged < 20.0) || ["", "_inside", "_outside"].iter().any(has_few)
+}
+
 /// Means over parts of the map of each case.
 fn hold_parts(ledger: &mut Ledger, bench: &Bench, s: &Scene, results: &Csv, maps: &[Csv]) {
     for (case, map) in maps.iter().enumerate() {
@@ -470,6 +481,12 @@ fn hold_parts(ledger: &mut Ledger, bench: &Bench, s: &Scene, results: &Csv, maps
             results.f("flagged_fraction")[case],
             flagged,
             1e-9,
+        );
+        ledger.equal(
+            "results.csv: standard_errors_rough",
+            results.f("standard_errors_rough")[case],
+            f64::from(u8::from(has_rough_errors(s, map))),
+            0.0,
         );
         ledger.equal(
             "results.csv: case",

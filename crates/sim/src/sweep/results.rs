@@ -166,11 +166,17 @@ impl<'p> Collected<'p> {
         let scans = map.scans.len();
         let flagged = map.flagged.sum() * scans as f64;
         let few_outliers = flagged > 0.5 && flagged < LEAST_FLAGGED;
-        few_outliers
-            || [ALL, INSIDE, OUTSIDE].into_iter().any(|part| {
-                let estimates = self.cells(part).len() * scans;
-                (1..LEAST_ESTIMATES).contains(&estimates)
-            })
+        if few_outliers {
+            return true;
+        }
+        for part in [ALL, INSIDE, OUTSIDE] {
+            let mut cells = self.cells(part);
+            cells.retain(|cell| map.rms_m_s[*cell].is_finite());
+            if (1..LEAST_ESTIMATES).contains(&(cells.len() * scans)) {
+                return true;
+            }
+        }
+        false
     }
 
     fn row(&self, map: &VelocityEstimates, scanner: &Scanner<'_>) -> Result<Vec<f64>, Error> {
