@@ -39,6 +39,7 @@
 //! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
 //! | [`wake_detection`] | whether a scan holds a wake: threshold for a rate of false alarms, smallest circulation that is found |
 //! | [`retrieval`] | from one scan of any instrument to its vortices, or none; tracks |
+//! | [`turbulence`] | spectra, covariances and structure functions of isotropic turbulence |
 //! | [`wind_profile`] | winds from beams in several directions: VAD with covariance, DBS |
 //! | `matched_filter` | how well vortices at many positions explain a scan: for the test for a wake, and for first guesses of fits |
 //! | `linalg`, `parallel` | solve and eigenvectors with residual checks, the bundled LAPACK; loops on the caller's threads |
@@ -67,6 +68,7 @@ pub mod models;
 mod parallel;
 pub mod retrieval;
 pub mod spectrum;
+pub mod turbulence;
 pub mod vortex_fit;
 pub mod wake_detection;
 pub mod wind_profile;

@@ -20,6 +20,7 @@ mod rolling_moment;
 mod secondary_vortices;
 mod shown_maps;
 mod sliding;
+mod turbulence;
 mod vortex_fit;
 mod wake_detection;
 mod wind_aliases;
