@@ -23,25 +23,25 @@ crate::keys::foreign_choices! {
 const MAX_OUTPUTS: usize = 9999;
 
 keys! {
-    /// A flow to be simulated, as its file says it; the flow itself has to be stated.
+    /// A flow to simulate, as given in a case file; the key `case` is required.
     table FlowCase {
         /// Version of the format; only [`FORMAT`] is read.
         format: u32 = FORMAT,
         /// The flow.
         case: CaseKind = CaseKind::VortexPair(VortexPairFlow::default()),
-        /// Time: the end, the scheme, the step.
+        /// Time integration: end, scheme, step.
         time: Time = Time::default(),
-        /// How the equations are solved.
+        /// Solution of the equations.
         solver: Solver = Solver::default(),
-        /// What is written.
+        /// Output files.
         output: Output = Output::default(),
-        /// How often the whole state is saved.
+        /// Interval of checkpoints.
         checkpoint: Checkpoint = Checkpoint::default(),
-        /// What is measured and written of a wake; only with `kind = "wake"`.
+        /// Measurements and output files of a wake; only with `kind = "wake"`.
         wake: Option<WakeOutput> = None,
     }
 
-    /// Time: the end, the scheme, the step.
+    /// Time integration: end, scheme, step.
     #[derive(Copy)]
     table Time {
         /// Time at which the run ends \[s\]; that of the literature if absent.
@@ -55,11 +55,11 @@ keys! {
         courant: Option<f64> = None => ABOVE_ZERO,
         /// Longest step that the Courant number may give \[s\].
         longest_step_s: Option<f64> = None => ABOVE_ZERO,
-        /// The run pauses after so many steps; it continues with `--restart` when this is raised or taken out.
+        /// Number of steps after which the run pauses; it continues with `--restart` once this is raised or removed.
         pause_after_steps: Option<u64> = None,
     }
 
-    /// The subgrid model; constants that are left out are the model's own.
+    /// The subgrid model; omitted constants have the model's defaults.
     #[derive(Copy)]
     kinds Subgrid by "model" {
         /// None: laminar flow, or direct simulation.
@@ -83,11 +83,11 @@ keys! {
         },
     }
 
-    /// How the equations are solved.
+    /// Solution of the equations.
     table Solver {
         /// How the pressure equation is solved.
         pressure: PressureMethod = PressureMethod::Auto,
-        /// Relative residual at which it counts as solved.
+        /// Relative residual at which the iteration stops.
         pressure_tolerance: f64 = 1e-10 => 1e-15..=0.1,
         /// The subgrid model.
         subgrid: Subgrid = Subgrid::None {},
@@ -101,7 +101,7 @@ keys! {
         InitialNetcdf = "initial_netcdf",
     }
 
-    /// What is written.
+    /// Output files.
     table Output {
         /// Times of the outputs \[s\]; the end alone if there are none and no interval.
         times_s: Vec<f64> = Vec::new() => Is(
@@ -120,14 +120,14 @@ keys! {
         planes: Vec<FileFormat> = vec![FileFormat::Netcdf],
     }
 
-    /// How often the whole state is saved; with neither, every 500 steps.
+    /// Interval of checkpoints; with neither interval, every 500 steps.
     #[derive(Copy)]
     table Checkpoint {
-        /// False: never.
+        /// Whether checkpoints are written.
         write: bool = true,
-        /// After so many steps.
+        /// Steps between checkpoints.
         every_steps: Option<u64> = None => Is(|steps: &Option<u64>| *steps != Some(0), "a whole number above 0"),
-        /// After so much simulated time \[s\].
+        /// Simulated time between checkpoints \[s\].
         every_s: Option<f64> = None => ABOVE_ZERO,
     }
 }

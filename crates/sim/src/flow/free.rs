@@ -24,34 +24,34 @@ crate::keys::foreign_choices! {
 }
 
 keys! {
-    /// What bounds a direction at one end.
+    /// Boundary condition at one end of a direction.
     choice EndName {
-        /// The flow repeats itself; both ends must say so.
+        /// Periodic; required at both ends.
         Periodic = "periodic",
-        /// A frictionless plane.
+        /// Free slip.
         Slip = "slip",
-        /// A wall to which the air sticks.
+        /// No-slip wall.
         NoSlip = "no_slip",
     }
 
     /// One direction of the mesh.
     #[derive(Copy)]
     table Axis {
-        /// Number of cells; 1 if nothing varies.
+        /// Number of cells; 1 for a direction along which nothing varies.
         cells: usize = 1 => 1..=100_000,
         /// Position of the low end \[m\].
         low_m: f64 = 0.0,
         /// Position of the high end \[m\].
         high_m: f64 = 1.0,
-        /// How the cells are spread.
+        /// Mapping of the cells.
         mapping: Spread = Spread::Uniform,
         /// Strength of the mapping, or amplitude of the sine.
         stretch: f64 = 0.0,
         /// Where a cluster is finest, as a fraction of the length.
         place: Option<f64> = None,
-        /// What bounds it at the low end.
+        /// Boundary condition at the low end.
         low_end: EndName = EndName::Periodic,
-        /// What bounds it at the high end.
+        /// Boundary condition at the high end.
         high_end: EndName = EndName::Periodic,
         /// Velocity `(u, v, w)` of a no-slip wall at the low end \[m/s\].
         low_velocity_m_s: [f64; 3] = [0.0; 3],
@@ -59,7 +59,7 @@ keys! {
         high_velocity_m_s: [f64; 3] = [0.0; 3],
     }
 
-    /// The field that the flow starts from.
+    /// Initial field.
     kinds InitialName by "kind" {
         /// The same velocity everywhere.
         "uniform" => Uniform {
@@ -108,7 +108,7 @@ keys! {
         viscosity_m2_s: f64 = 0.1 => ZERO_OR_MORE,
         /// Body force per mass along x, y, z \[m/s^2\].
         force_m_s2: [f64; 3] = [0.0; 3] => FINITE,
-        /// The field that the flow starts from.
+        /// Initial field.
         initial: InitialName = InitialName::VortexPair(InitialPair::default()),
     }
 }

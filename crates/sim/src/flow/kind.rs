@@ -13,9 +13,9 @@ keys! {
     kinds CaseKind by "kind" {
         /// A vortex pair above ground, in plane or space.
         "vortex_pair" => VortexPair(VortexPairFlow),
-        /// The wake of an aircraft near the ground, measured while it runs.
+        /// The wake of an aircraft near the ground, measured during the run.
         "wake" => Wake(Box<WakeFlow>),
-        /// A mesh, viscosity and initial field of one's own, in SI units.
+        /// User-supplied mesh, viscosity and initial field, in SI units.
         "free" => Free(Box<Free>),
     }
 }

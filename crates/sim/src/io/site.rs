@@ -4,7 +4,7 @@ use super::utc::UtcTime;
 use crate::keys::{Is, keys};
 
 keys! {
-    /// Where the lidar stands and when the flow began; only written to the files.
+    /// Position of the lidar and start time of the flow; only written to the files.
     table Site {
         /// Name of the place.
         name: String = "simulated runway".into() => Is(

@@ -12,13 +12,13 @@ keys! {
         backscatter_per_m_sr: f64 = 1e-7 => 0.0..=1.0,
         /// Extinction coefficient, 1/m, one way.
         extinction_per_m: f64 = 7e-5 => 0.0..=1.0,
-        /// Aerosol that changes with range, in place of the two values above.
+        /// Aerosol as a function of range, in place of the two values above.
         profile: Option<AirProfile> = None,
         /// Refractive turbulence.
         turbulence: Turbulence = Turbulence::None {},
     }
 
-    /// Aerosol along the lines of sight: straight lines between the ranges, beyond them as at the ends.
+    /// Aerosol along the lines of sight: linear between the ranges, constant beyond them.
     table AirProfile {
         /// Ranges, m, increasing.
         range_m: Vec<f64> = Vec::new(),
@@ -28,11 +28,11 @@ keys! {
         extinction_per_m: Vec<f64> = Vec::new(),
     }
 
-    /// Which efficiency the pulses have.
+    /// Efficiency of the pulses.
     choice EfficiencyOfPulse {
-        /// All the mean.
+        /// The mean for all pulses.
         Mean = "mean",
-        /// Each that of one realisation of the path, in turn.
+        /// That of one realisation of the path for each pulse, in turn.
         Realisation = "realisation",
     }
 
@@ -45,7 +45,7 @@ keys! {
         "refractive" => Refractive(RefractiveTurbulence),
     }
 
-    /// Turbulence of constant strength along the path, and how a Monte Carlo samples it.
+    /// Turbulence of constant strength along the path, and its Monte Carlo sampling.
     #[derive(Copy)]
     table RefractiveTurbulence {
         /// Structure constant Cn2, m^(-2/3).
@@ -56,7 +56,7 @@ keys! {
         inner_scale_m: f64 = 0.01 => 0.0..=1.0,
         /// Outer scale L0, of wave number 1/L0, m; `inf` for none.
         outer_scale_m: f64 = 1.0 => ABOVE_ZERO_OR_INF,
-        /// Who chooses grid and layers of the phase screens.
+        /// Choice of grid and layers of the phase screens.
         sampling: ScreenSampling = ScreenSampling::Explicit,
         /// Points along each side of the phase screens; not used with `sampling = "derived"`.
         grid_points: usize = 512 => 16..=16_384,
@@ -64,17 +64,17 @@ keys! {
         grid_spacing_m: f64 = 0.002 => 1e-5..=1.0,
         /// Phase screens along the path; not used with `sampling = "derived"`.
         layers: usize = 10 => 1..=10_000,
-        /// Realisations of the path; the error of a mean over antithetic pairs is taken by leaving out one of three: +A +B -A -B +C.
+        /// Realisations of the path, in antithetic pairs; standard errors by the jackknife over pairs.
         realisations: usize = 400 => 5..=10_000_000,
-        /// Which efficiency the pulses have.
+        /// Efficiency of the pulses.
         efficiency: EfficiencyOfPulse = EfficiencyOfPulse::Mean,
     }
 
-    /// Who chooses grid and layers of the phase screens.
+    /// Choice of grid and layers of the phase screens.
     choice ScreenSampling {
-        /// The scene; what cannot be resolved is refused, what is doubtful is warned of.
+        /// By the keys below; a grid that cannot resolve the beam is refused, a doubtful one gives a warning.
         Explicit = "explicit",
-        /// The planner, from beam, turbulence and range.
+        /// Derived from beam, turbulence and range.
         Derived = "derived",
     }
 

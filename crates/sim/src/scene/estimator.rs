@@ -6,19 +6,19 @@ use crate::keys::{Checker, Is, Number, keys};
 use wakescope_estimate::Refinement;
 
 keys! {
-    /// From signals to velocities.
+    /// Estimation of velocities from signals.
     table Estimator {
         /// Samples N of a window.
         window_samples: usize = 64 => 4..=65_536,
         /// Weighting h of the window, (29).
         weighting: Weighting = Weighting::Gaussian,
-        /// Samples between windows that are accumulated.
+        /// Samples between accumulated windows.
         window_step_samples: usize = 1 => 1..=1_000_000,
         /// Samples between gates of the map.
         gate_step_samples: usize = 5 => 1..=1_000_000,
         /// Points of the zero-padded spectrum; `window_samples` for the literal (29).
         padded_samples: usize = 1024 => 1..=1 << 22,
-        /// How the peak is refined between the points of the spectrum.
+        /// Refinement of the peak between the points of the spectrum.
         refinement: Refinement = Refinement::Parabola,
         /// Radius of the circular region of accumulation, m.
         radius_m: f64 = 2.0 => 0.0..=1e5,
@@ -28,17 +28,17 @@ keys! {
             |rate| rate == 0.0 || (1e-12..=0.5).contains(&rate),
             "0 for no test, or from 1e-12 to 0.5: the probability that noise passes at a gate, for example 0.01",
         ),
-        /// Which estimator, with the keys that are its own.
+        /// Estimator, with its keys.
         method: Method = Method::PeriodogramAccumulation(PeriodogramAccumulation {}),
-        /// How the radius depends on range.
+        /// Dependence of the radius on range.
         radius: RegionRadius = RegionRadius::Fixed {},
     }
 
-    /// How the radius of the region depends on range.
+    /// Dependence of the radius of the region on range.
     kinds RegionRadius by "kind" {
         /// `radius_m` at every range.
         "fixed" => Fixed {},
-        /// Straight lines between the points of a table; beyond its ends as at the ends.
+        /// Linear interpolation in a table, constant beyond its ends.
         "of_range" => OfRange {
             /// Ranges, m, increasing.
             range_m: Vec<f64> => Is(
@@ -48,9 +48,9 @@ keys! {
             /// Radius at each, m.
             radius_m: Vec<f64>,
         },
-        /// The smallest for which the bound on the velocity reaches a standard deviation.
+        /// Smallest radius for which the Cramér-Rao bound of the velocity reaches `std_m_s`.
         "target" => Target {
-            /// That standard deviation, m/s.
+            /// Standard deviation to reach, m/s.
             standard_deviation_m_s: f64 => 1e-6..=1e3,
             /// Largest radius, m.
             largest_m: f64 => 1e-3..=1e5,
@@ -59,9 +59,9 @@ keys! {
 
     /// Weighting of the samples of a window.
     choice Weighting {
-        /// Gaussian, as the chapter's default.
+        /// Gaussian, the default.
         Gaussian = "gaussian",
-        /// All samples alike.
+        /// Uniform.
         Rectangular = "rectangular",
         /// Hann.
         Hann = "hann",

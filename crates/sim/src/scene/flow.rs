@@ -52,12 +52,12 @@ keys! {
         aircraft: Option<Aircraft> = None,
     }
 
-    /// An aircraft on its way along +x.
+    /// An aircraft that flies along +x.
     #[derive(Copy)]
     table Aircraft {
         /// Speed, m/s.
         speed_m_s: f64 = 70.0 => 1.0..=1e3,
-        /// Where it is when the scan begins, m.
+        /// Its position along x at the start of the scan, m.
         x_m: f64 = 0.0 => -1e6..=1e6,
     }
 
@@ -66,13 +66,13 @@ keys! {
     table LinearWind {
         /// Wind at the origin when the scan begins (u, v, w), m/s.
         velocity_m_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
-        /// How fast u changes along x, y, z, 1/s.
+        /// Gradient of u along x, y, z, 1/s.
         gradient_u_per_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
-        /// How fast v does.
+        /// Gradient of v along x, y, z, 1/s.
         gradient_v_per_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
-        /// How fast w does.
+        /// Gradient of w along x, y, z, 1/s.
         gradient_w_per_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
-        /// How fast they change in time, m/s^2.
+        /// Rate of change in time (u, v, w), m/s^2.
         acceleration_m_s2: [f64; 3] = [0.0; 3] => -1e3..=1e3,
     }
 
@@ -99,25 +99,25 @@ keys! {
         velocity_unit_m_s: f64 = 1.0 => 1e-6..=1e6,
         /// Whether the flow repeats itself along the file's x.
         periodic_x: bool = false,
-        /// Whether it does along its y.
+        /// Whether it repeats itself along the file's y.
         periodic_y: bool = false,
-        /// What lies below its lowest nodes.
+        /// Treatment of heights below the lowest nodes.
         ground: FieldGround = FieldGround::Open,
     }
 
-    /// What lies below the lowest nodes of fields.
+    /// Treatment of heights below the lowest nodes of fields.
     choice FieldGround {
-        /// Nothing is known there.
+        /// Not known: lines below are outside the flow.
         Open = "open",
-        /// A wall at z = 0 to which the air sticks.
+        /// No-slip wall at z = 0.
         NoSlip = "no_slip",
-        /// A wall at z = 0 without friction.
+        /// Free-slip wall at z = 0.
         Slip = "slip",
     }
 
     /// Whether the analytic pair moves.
     choice VortexMotion {
-        /// It stays where it was released.
+        /// It does not move.
         Frozen = "frozen",
         /// It follows the inviscid hyperbola over the ground, also during the scan.
         Inviscid = "inviscid",
@@ -133,7 +133,7 @@ keys! {
         motion: SimulatedMotion = SimulatedMotion::Moving,
         /// Time of the flow when the scan begins, s; the first of the planes if neither this nor `age_tau` is given.
         time_s: Option<f64> = None => -1e9..=1e9,
-        /// The same as an age of the wake.
+        /// Age of the wake when the scan begins, in place of `time_s`.
         age_tau: Option<f64> = None => -1e9..=1e9,
         /// Distance from the lidar to y = 0 of the flow, m.
         lateral_position_m: f64 = 400.0 => -1e5..=1e5,
@@ -145,18 +145,18 @@ keys! {
 
     /// Whether a simulated flow moves during the scan.
     choice SimulatedMotion {
-        /// It stands still as it was when the scan began.
+        /// Frozen as at the start of the scan.
         Frozen = "frozen",
         /// It moves from plane to plane; the planes must reach to the end of the scan.
         Moving = "moving",
     }
 
-    /// What a line of sight meets where the wind is not known.
+    /// Treatment of a line of sight where the wind is not known.
     #[derive(Copy)]
     kinds Outside by "policy" {
         /// The scene is refused.
         "error" => Error {},
-        /// Nothing that returns light.
+        /// No backscatter there.
         "mask" => Mask {},
     }
 }

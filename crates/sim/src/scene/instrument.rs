@@ -39,9 +39,9 @@ keys! {
     /// The Gaussian pulse (7).
     #[derive(Copy)]
     table GaussianShape {
-        /// Pulse duration, s, as [`PulseDefinition`] has it.
+        /// Pulse duration, s, by the definition `definition`.
         duration_s: f64 = 200e-9 => 1e-9..=1e-4,
-        /// What `duration_s` means.
+        /// Definition of `duration_s`.
         definition: PulseDefinition = PulseDefinition::Fwhm,
     }
 
@@ -57,7 +57,7 @@ keys! {
         centred: bool = true,
     }
 
-    /// What a pulse duration means.
+    /// Definition of the pulse duration.
     choice PulseDefinition {
         /// Full width at half maximum of |f|^2: 2 sqrt(ln 2) sigma.
         Fwhm = "fwhm",
@@ -79,9 +79,9 @@ keys! {
         local_oscillator_w: f64 = 1e-3 => 1e-12..=1e3,
         /// Spectrum of the shot noise.
         noise: NoiseModel = NoiseModel::BandLimited,
-        /// What the receiver delivers.
+        /// Output signal of the receiver.
         signal: DetectorSignal = DetectorSignal::IntermediateFrequency,
-        /// What the receiver has beyond shot noise.
+        /// Noise and response of the receiver beyond shot noise.
         front_end: Option<FrontEnd> = None,
         /// The analogue-to-digital converter.
         digitiser: Digitiser = Digitiser::None {},
@@ -89,7 +89,7 @@ keys! {
         snr: SnrReference = SnrReference::Physical {},
     }
 
-    /// What the receiver delivers.
+    /// Output signal of the receiver.
     choice DetectorSignal {
         /// The real current at the intermediate frequency.
         IntermediateFrequency = "intermediate_frequency",
@@ -144,21 +144,21 @@ keys! {
         receiver: ReceiverPath = ReceiverPath::Monostatic,
         /// Loss of the optics, out and back together, with the light whose polarisation does not beat, dB.
         optics_loss_db: f64 as omitted = 0.0 => 0.0..=200.0,
-        /// Part of the pulse that the telescope sends straight to the detector, dB; `-inf` for none.
+        /// Reflection of the pulse by the telescope onto the detector, relative to the pulse, dB; `-inf` for none.
         reflection_db: f64 as omitted = f64::NEG_INFINITY => Number(
             |value| value == f64::NEG_INFINITY || (-300.0..=0.0).contains(&value),
             "a number from -300.0 to 0.0 {}, or -inf for none",
         ),
-        /// Range up to which nothing is seen, because the detector recovers from the reflection, m; 0 for none.
+        /// Range below which the detector, saturated by the reflection, measures nothing, m; 0 for none.
         blind_range_m: f64 as omitted = 0.0 => 0.0..=1e6,
     }
 
-    /// What the receiver has beyond shot noise.
+    /// Noise and response of the receiver beyond shot noise.
     #[derive(Copy)]
     table FrontEnd {
         /// Current noise of the amplifier, A/sqrt(Hz).
         amplifier_noise_a_rthz: f64 = 0.0 => 0.0..=1.0,
-        /// Resistor whose thermal noise the amplifier sees, ohm; `inf` for none.
+        /// Load resistor of the detector, a source of thermal noise, ohm; `inf` for none.
         load_ohm: f64 = f64::INFINITY => ABOVE_ZERO_OR_INF,
         /// Its temperature, K.
         load_temperature_k: f64 = 290.0 => 1e-3..=1e4,
@@ -169,20 +169,20 @@ keys! {
             |value| value == f64::NEG_INFINITY || (-400.0..=0.0).contains(&value),
             "a number from -400.0 to 0.0 {}, or -inf for none",
         ),
-        /// Rejection of what both halves of a balanced detector see, electrical, dB.
+        /// Common-mode rejection of a balanced detector, electrical, dB.
         rejection_db: f64 = 0.0 => 0.0..=200.0,
-        /// Power at which the current has fallen to half of the linear one, W; `inf` for none.
+        /// Saturation power: the current is half that of a linear detector there, W; `inf` for none.
         saturation_w: f64 = f64::INFINITY => ABOVE_ZERO_OR_INF,
-        /// Frequency at which the response of the detector has fallen to half the power, Hz; `inf` for none.
+        /// Half-power cut-off frequency of the detector, Hz; `inf` for none.
         half_power_hz: f64 = f64::INFINITY => ABOVE_ZERO_OR_INF,
-        /// Poles of this response, a Butterworth low pass.
+        /// Number of poles of this Butterworth low pass.
         poles: u32 = 1 => 1..=20,
     }
 
-    /// The echo of the pulse before, from c/(2 PRF) farther away.
+    /// Echo of the previous pulse, from c/(2 PRF) farther away.
     #[derive(Copy)]
     table SecondTrip {
-        /// Radial velocity of the air there where the flow is not known, m/s.
+        /// Radial velocity of the air at those ranges if the flow is not known there, m/s.
         radial_velocity_m_s: f64 = 0.0 => -1e3..=1e3,
     }
 }

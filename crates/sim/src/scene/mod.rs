@@ -75,62 +75,62 @@ keys! {
         telescope: Telescope = Telescope::default(),
         /// Aerosol and refractive turbulence.
         atmosphere: Atmosphere = Atmosphere::default(),
-        /// The wind that the lidar sees.
+        /// The wind.
         flow: Flow = Flow::VortexPair(VortexPair::default()),
-        /// Further winds that are added to it.
+        /// Further winds, added to it.
         added_flows: Vec<Flow> as omitted = Vec::new(),
-        /// Where the lidar looks.
+        /// The scan.
         scan: Scan = Scan::default(),
-        /// From signals to velocities.
+        /// Estimation of velocities from signals.
         estimator: Estimator = Estimator::default(),
-        /// Vortices from each realisation; absent: none are looked for.
+        /// Retrieval of vortices from each realisation; none if absent.
         retrieval: Option<Retrieval> = None,
-        /// What is written.
+        /// Output files.
         outputs: Outputs = Outputs::default(),
-        /// Place and date, for the files.
+        /// Place and date, written to the files.
         site: Site = Site::default(),
     }
 
-    /// Where the lidar looks: a vertical scan (RHI) across the runway, if no other pattern is stated.
+    /// The scan: a vertical one (RHI) across the runway unless another pattern is given.
     table Scan {
         /// Height of the telescope above the ground, m.
         lidar_height_m: f64 = 0.0 => 0.0..=1e4,
         /// Azimuth of the scan plane, rad, clockwise from north; only written to the files.
         azimuth_rad: f64 = std::f64::consts::FRAC_PI_2 => 0.0..=TAU,
-        /// Lowest line of sight, rad above the horizon.
+        /// Elevation of the lowest line of sight, rad.
         elevation_min_rad: f64 = 0.0 => -FRAC_PI_2..=FRAC_PI_2,
-        /// Upper limit of the lines of sight, rad.
+        /// Upper limit of the elevation of the lines of sight, rad.
         elevation_max_rad: f64 = 0.2304 => -FRAC_PI_2..=FRAC_PI_2,
         /// Angle between lines of sight, rad.
         elevation_step_rad: f64 = 1.25e-3 => 1e-7..=FRAC_PI_2,
         /// Range of the first recorded sample, m.
         range_min_m: f64 = 280.0 => 1.0..=1e6,
-        /// No sample beyond this range is recorded, m.
+        /// Range of the last recorded sample, m.
         range_max_m: f64 = 520.0 => 1.0..=1e6,
-        /// Pulses sent along each line.
+        /// Pulses per line of sight.
         pulses_per_line: usize = 16 => 1..=1_000_000,
-        /// Independent repetitions of the whole scan, for the errors.
+        /// Independent realisations of the whole scan, from which errors are computed.
         realisations: usize = 4 => 1..=1_000_000,
-        /// The echo of the pulse before; absent: it is long gone.
+        /// Second-trip echo; none by default.
         second_trip: Option<SecondTrip> = None,
-        /// What lines below the ground meet.
+        /// Treatment of lines below the ground.
         below_ground: Outside = Outside::Error {},
-        /// What lines that leave a simulated flow meet.
+        /// Treatment of lines that leave a simulated flow.
         outside_flow: Outside = Outside::Error {},
-        /// Which way the lidar looks, line after line.
+        /// Pattern of the lines of sight.
         pattern: Pattern as omitted = Pattern::default(),
-        /// How the lines follow each other.
+        /// Sequence and timing of the lines.
         head: HeadMotionKeys as omitted = HeadMotionKeys::default(),
-        /// Where the lidar is.
+        /// Position of the lidar.
         lidar: LidarPlace as omitted = LidarPlace::default(),
-        /// How many airs the pulses of a line meet.
+        /// How often the wind is sampled within a line: once or per pulse.
         wind_of_pulses: WindOfPulses as omitted = WindOfPulses::default(),
     }
 
-    /// What is written.
+    /// Output files.
     #[derive(Copy)]
     table Outputs {
-        /// Tables of every number.
+        /// Tables (CSV) of all results.
         csv: bool = true,
         /// NetCDF: the map as CfRadial, the flow as CF.
         netcdf: bool = true,
@@ -138,13 +138,13 @@ keys! {
         svg: bool = true,
         /// Pictures as PNG.
         png: bool = true,
-        /// The wind on a cross-plane around the scan.
+        /// The wind on a plane around the scan.
         flow: bool = true,
         /// The map as a HALO Photonics raw file.
         hpl: bool = false,
         /// The raw signals.
         signals: bool = false,
-        /// Of which realisations.
+        /// Realisations whose raw signals are written.
         signals_of: SignalsOf = SignalsOf::First,
         /// First range of the efficiency and SNR profile, m.
         profile_range_min_m: f64 = 100.0 => 1.0..=1e6,
@@ -154,11 +154,11 @@ keys! {
         profile_points: usize = 59 => 2..=100_000,
     }
 
-    /// Which realisations of the raw signals are kept.
+    /// Realisations whose raw signals are written.
     choice SignalsOf {
         /// The first.
         First = "first",
-        /// Every one.
+        /// All of them.
         All = "all",
     }
 }

@@ -7,11 +7,11 @@ use crate::keys::{Checker, Is, Named, Number, keys, side};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI, TAU};
 
 keys! {
-    /// Which way the lidar looks, line after line.
+    /// Pattern of the lines of sight.
     kinds Pattern by "kind" {
-        /// Upwards in one vertical plane, by the elevations of `[scan]`.
+        /// Range-height indicator (RHI): elevation scan in one vertical plane, by the elevations of `[scan]`.
         "rhi" => Rhi {},
-        /// Round at one elevation or several.
+        /// Plan position indicator (PPI): azimuth scans at one elevation or several.
         "ppi" => Ppi {
             /// Elevation of each sweep, rad.
             elevations_rad: Vec<f64> = vec![0.05]
@@ -24,14 +24,14 @@ keys! {
             /// Angle between lines, rad; a head that moves during a line has its own.
             azimuth_step_rad: f64 = TAU / 360.0 => 1e-7..=PI,
         },
-        /// Turns of evenly spaced beams on a cone.
+        /// Velocity azimuth display (VAD): evenly spaced beams on a cone.
         "vad" => Vad {
             /// Elevation of the beams, rad.
             elevation_rad: f64 = FRAC_PI_3 => 1e-3..=FRAC_PI_2 - 1e-3,
-            /// Beams of a turn.
+            /// Beams per turn.
             beams: usize = 24 => 4..=10_000,
         },
-        /// Four slanted beams and one straight up.
+        /// Doppler beam swinging (DBS): four slanted beams and a vertical one.
         "dbs" => Dbs {
             /// Elevation of the slanted beams, rad.
             elevation_rad: f64 = 62.0 * PI / 180.0 => 1e-3..=FRAC_PI_2 - 1e-3,
@@ -45,7 +45,7 @@ keys! {
         },
         /// Rows of elevation about the flight path, by the elevations of `[scan]`.
         "axial" => Axial {
-            /// Towards which end of the flight path the lidar looks.
+            /// End of the flight path towards which the lidar points.
             towards: Towards = Towards::PlusX,
             /// First azimuth beside the path, rad.
             azimuth_min_rad: f64 = -0.05 => -TAU..=TAU,
@@ -63,23 +63,23 @@ keys! {
 
     /// An end of the flight path.
     choice Towards {
-        /// Where aircraft fly to.
+        /// The end towards which aircraft fly.
         PlusX = "plus_x",
-        /// Where they come from.
+        /// The end from which they come.
         MinusX = "minus_x",
     }
 
-    /// What the head does during a line.
+    /// Motion of the scanner head during a line.
     #[derive(Default)]
     choice HeadMotion {
-        /// It stands still, and moves between lines.
+        /// At rest during a line, moving between lines.
         #[default]
         Stepped = "stepped",
-        /// It turns at `rate_rad_s`.
+        /// Turning at `rate_rad_s`.
         Continuous = "continuous",
     }
 
-    /// The way of one sweep after another.
+    /// Direction of successive sweeps.
     #[derive(Default)]
     choice SweepDirection {
         /// Each from its first angle.
@@ -89,30 +89,30 @@ keys! {
         Alternate = "alternate",
     }
 
-    /// How the lines follow each other.
+    /// Sequence and timing of the lines.
     #[derive(Copy)]
     table HeadMotionKeys {
-        /// What the head does during a line.
+        /// Motion of the scanner head during a line.
         motion: HeadMotion = HeadMotion::Stepped,
-        /// How often the whole pattern is repeated: its sweeps, turns or cycles.
+        /// Repetitions of the whole pattern: sweeps, turns or cycles.
         sweeps: usize = 1 => 1..=100_000,
-        /// The way of one sweep after another.
+        /// Direction of successive sweeps.
         direction: SweepDirection = SweepDirection::Same,
-        /// Largest rate of the head, rad/s; without one it jumps.
+        /// Largest angular rate of the head, rad/s; infinite by default.
         rate_rad_s: f64 = f64::INFINITY
             => Number(|rate| rate > 0.0, "a number above 0 in rad/s; inf for a head that jumps"),
         /// Acceleration of the head, rad/s^2.
         acceleration_rad_s2: f64 = f64::INFINITY => Number(|rate| rate > 0.0, "a number above 0 in rad/s^2, or inf"),
-        /// Time that each line takes beside its pulses, s.
+        /// Time per line beyond that of its pulses, s.
         dead_time_s: f64 = 0.0 => 0.0..=1e5,
     }
 
-    /// Where the lidar is beside its height, and where north is.
+    /// Position of the lidar apart from its height, and the direction of north.
     #[derive(Copy)]
     table LidarPlace {
-        /// Place along the flight, m.
+        /// Position along the flight, m.
         x_m: f64 = 0.0 => -1e6..=1e6,
-        /// Place across it, m.
+        /// Position across it, m.
         y_m: f64 = 0.0 => -1e6..=1e6,
         /// Velocity of the lidar (u, v, w), m/s.
         velocity_m_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
@@ -120,12 +120,12 @@ keys! {
         flight_azimuth_rad: Option<f64> = None => -TAU..=TAU,
     }
 
-    /// How many airs the pulses of a line meet.
+    /// How often the wind is sampled within a line.
     #[derive(Copy, Eq)]
     kinds WindOfPulses by "kind" {
-        /// One: that of the middle of the line.
+        /// Once, at the middle of the line.
         "line" => Line {},
-        /// Each its own.
+        /// Per pulse.
         "pulse" => Pulse {},
     }
 }

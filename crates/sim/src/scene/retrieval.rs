@@ -6,7 +6,7 @@ use crate::keys::{Checker, Is, keys};
 use wakescope_estimate::vortex_fit::{LiftSlope, Secondary};
 
 keys! {
-    /// How circulations are found.
+    /// Retrieval method.
     #[derive(Default)]
     #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
     choice RetrievalMethod {
@@ -15,26 +15,26 @@ keys! {
         Fit = "fit",
         /// Fit of the wake to all raw signals.
         Signals = "signals",
-        /// Radial-velocity method: places from extremes, circulations by linear least squares.
+        /// Radial-velocity method: positions from extremes, circulations by linear least squares.
         Rv = "rv",
-        /// Velocity envelopes of the spectra of raw signals about the wake that is fitted to their map.
+        /// Velocity envelopes of the spectra of raw signals about the wake fitted to their map.
         Envelope = "envelope",
     }
 
-    /// Vortices from each realisation, held against the truth of the flow.
+    /// Retrieval of vortices from each realisation, compared with the truth of the flow.
     table Retrieval {
-        /// How circulations are found, each method beside the others.
+        /// Retrieval methods; each is applied to every realisation.
         methods: Vec<RetrievalMethod> = vec![RetrievalMethod::Fit] => Is(
             |list: &Vec<RetrievalMethod>| !list.is_empty() && (1..list.len()).all(|i| !list[..i].contains(&list[i])),
             "at least one of \"fit\", \"signals\", \"rv\", \"envelope\", each once, for example [\"fit\", \"rv\"]",
         ),
-        /// Core radius that fits keep, m; fitted if absent.
+        /// Fixed core radius of the fits, m; fitted if absent.
         core_radius_m: Option<f64> = None => 1e-3..=1e3,
         /// Whether secondary vortices are fitted beside a pair.
         secondary: Secondary = Secondary::Auto,
-        /// Rate of false alarms of a scan at which the maps are tested for a wake; absent: no test.
+        /// False-alarm rate per scan at which the maps are tested for a wake; no test if absent.
         false_alarm: Option<f64> = None => 1e-9..=0.5,
-        /// The aircraft that follows; absent: none.
+        /// The following aircraft; none if absent.
         follower: Option<FollowingAircraft> = None,
     }
 

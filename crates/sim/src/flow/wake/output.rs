@@ -3,7 +3,7 @@
 use crate::keys::{ABOVE_ZERO, Checker, FINITE, keys};
 
 keys! {
-    /// What is measured and written of a wake, by its age `tau`.
+    /// Measurements and output files of a wake, by its age `tau`.
     table WakeOutput {
         /// Age at which the run ends.
         end_tau: f64 = 5.0 => ABOVE_ZERO,
@@ -13,7 +13,7 @@ keys! {
         fields_tau: Option<Vec<f64>> = None,
         /// Ages of cross-planes; half the end and the end if absent.
         planes_tau: Option<Vec<f64>> = None,
-        /// First and last age of a series of cross-planes, for scans during which the flow moves.
+        /// First and last age of a series of cross-planes, for scans of a moving flow.
         series_tau: Option<[f64; 2]> = None,
         /// Time between the planes of the series.
         series_every_tau: f64 = 0.02 => ABOVE_ZERO,

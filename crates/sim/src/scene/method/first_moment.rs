@@ -9,7 +9,7 @@ use wakescope_estimate::{self as estimate, SignalKind, estimators};
 keys! {
     /// Mean of the main peak of the spectrum.
     table FirstMoment {
-        /// Half width of the part of the spectrum that is averaged, in its standard deviations.
+        /// Half width of the averaged interval of the spectrum, in standard deviations of the peak.
         moment_reach: f64 = 3.5 => 0.1..=100.0,
     }
 }

@@ -12,7 +12,7 @@ use wakescope_estimate::spectrum::Taper;
 keys! {
     /// Maximum likelihood of the velocity for the known pulse, by tapers.
     table Likelihood {
-        /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
+        /// Signal-to-noise ratio that the estimator assumes, dB; that of the scene if absent.
         likelihood_snr_db: Option<f64> = None => -100.0..=100.0,
     }
 }

@@ -23,7 +23,7 @@ use wakescope_estimate::spectrum::Taper;
 use wakescope_estimate::{self as estimate, SignalKind, SpectralPeak};
 
 keys! {
-    /// Which estimator makes the map, with its own keys.
+    /// Estimator of the map, with its keys.
     kinds Method by "kind" with EstimationMethod {
         /// Mean periodogram of the pulses of one line at one range, no region.
         "periodogram" => Periodogram(Periodogram),
