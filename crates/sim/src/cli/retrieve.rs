@@ -167,13 +167,22 @@ impl RetrieveArgs {
                 let samples = (window_s * WIDE_HZ).round().max(1.0) as u64;
                 keys.push(("estimator.window_samples", samples.to_string()));
             }
-            let weighting = self.weighting.as_deref().unwrap_or("rectangular");
-            keys.push(("estimator.weighting", format!("{weighting:?}")));
             // Gates of one line each, and a band that is wide enough for all instruments.
-            if method != "periodogram" {
-                keys.push((Estimator::RADIUS, "0.0".to_owned()));
+            for (key, stated, default) in [
+                (
+                    Estimator::WEIGHTING,
+                    self.weighting.as_deref(),
+                    "\"rectangular\"",
+                ),
+                (Estimator::RADIUS, None, "0.0"),
+                (Estimator::PADDED_SAMPLES, None, "4096"),
+            ] {
+                match stated {
+                    Some(word) => keys.push((key, format!("{word:?}"))),
+                    None if used_by(method, key)? => keys.push((key, default.to_owned())),
+                    None => {}
+                }
             }
-            keys.push(("estimator.padded_samples", "4096".to_owned()));
             for (key, value_hz) in [
                 ("detector.sampling_hz", WIDE_HZ),
                 ("detector.intermediate_frequency_hz", 0.25 * WIDE_HZ),
@@ -186,11 +195,21 @@ impl RetrieveArgs {
         for (key, value) in keys {
             text += &format!("{key} = {value}\n");
         }
-        Ok(SceneFile::parse(
-            &text,
-            Path::new("what --estimator, --pulse, --window and --weighting state"),
-        )?)
+        Ok(SceneFile::parse(&text, Path::new(STATED))?)
     }
+}
+
+/// Source of the keys of a scene that options give, for messages.
+const STATED: &str = "what --estimator, --pulse, --window and --weighting state";
+
+/// Whether the estimator of that name uses a key.
+///
+/// # Errors
+/// Fails if there is no estimator of that name.
+fn used_by(method: &str, key: &str) -> Result<bool, Error> {
+    let text = format!("estimator.method.kind = {method:?}");
+    let scene = SceneFile::without_limits(&text, Path::new(STATED))?;
+    Ok(scene.estimator.method.behaviour().uses(key))
 }
 
 /// What was found in all scans.

@@ -451,6 +451,18 @@ fn equal_velocities_have_equal_circulations_whether_their_scene_is_found_or_stat
             "{a}, {b}"
         );
     }
+    // Keys that an estimator does not use are not stated for it.
+    for method in ["pulse_pair", "likelihood"] {
+        let words = format!("bare.csv --estimator {method} --pulse 200e-9 --window 256e-9");
+        let found = retrieved(folder, &words);
+        for row in 0..2 {
+            let circulation = number(&found, row, "gamma_5_15_m2_s");
+            assert!(
+                (circulation - 466.635).abs() < 0.3 * 466.635,
+                "{method}: {circulation}"
+            );
+        }
+    }
     let refused = wakescope(
         folder,
         &[
