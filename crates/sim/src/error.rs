@@ -68,10 +68,12 @@ pub enum Error {
     },
     /// A line of sight leaves the simulated flow, and the scene does not say what is there.
     #[error(
-        "the line at elevation {elevation_rad:.6} rad leaves the simulated flow at range {range_m:.2} m (x = {x_m:.2} m, y = {y_m:.2} m, \
-         z = {z_m:.2} m): shorten the scan, or set scan.outside_flow.policy to \"mask\""
+        "the line at elevation {elevation_rad:.6} rad leaves the simulated flow at range {range_m:.2} m, {time_s:.2} s after the start of the \
+         scan (x = {x_m:.2} m, y = {y_m:.2} m, z = {z_m:.2} m): shorten the scan, or set scan.outside_flow.policy to \"mask\""
     )]
     OutsideFlow {
+        /// Time after the start of the scan, s.
+        time_s: f64,
         /// Elevation of the line, rad.
         elevation_rad: f64,
         /// Range of the point, m.

@@ -51,7 +51,7 @@ impl<'a> Text<'a> {
             }),
             Err(error) => {
                 let index = error.span().map_or(0, |span| span.start);
-                let key = key_before(text, index).map(|key| format!("{}: ", quote(key)));
+                let key = key_of_line(text, index).map(|key| format!("{}: ", quote(key)));
                 Err(SceneError::Malformed {
                     path: path.to_owned(),
                     line: breaks.partition_point(|end| *end < index) + 1,
@@ -236,10 +236,11 @@ fn whole_up_to(value: &DeValue<'_>, largest: u64) -> Option<i64> {
     is_allowed.then_some(number)
 }
 
-/// The bare key of the line that a text has before an index.
-fn key_before(text: &str, index: usize) -> Option<&str> {
-    let before = text.get(..index)?.lines().next_back()?;
-    let (key, _) = before.split_once('=')?;
+/// The key of the line that holds the byte at `index`, if the line has one.
+fn key_of_line(text: &str, index: usize) -> Option<&str> {
+    let start = text.get(..index)?.rfind('\n').map_or(0, |end| end + 1);
+    let line = text.get(start..)?.lines().next()?;
+    let (key, _) = line.split_once('=')?;
     let key = key.trim();
     let is_bare = key
         .bytes()

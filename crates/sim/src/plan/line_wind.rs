@@ -119,6 +119,7 @@ fn velocity_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<Vec<f64>,
         match outside {
             // A scene with lines below the ground was refused, but for air behind its last sample.
             Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow {
+                time_s: beam.time_s,
                 elevation_rad,
                 range_m,
                 x_m,

@@ -116,7 +116,7 @@ impl SceneWind {
                 end_s: last_s,
                 ..Self::of(wind, source)
             },
-            SimulatedMotion::Frozen => Self {
+            SimulatedMotion::Frozen | SimulatedMotion::Carried => Self {
                 start_s,
                 ..Self::of(
                     Box::new(Retimed {

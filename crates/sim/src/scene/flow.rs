@@ -85,6 +85,8 @@ keys! {
         names: [String; 3] = ["u".into(), "v".into(), "w".into()],
         /// Whether the flow moves during the scan.
         motion: SimulatedMotion = SimulatedMotion::Moving,
+        /// Velocity along x and y that carries the field, m/s; only with `motion = "carried"`.
+        carried_m_s: [f64; 2] as omitted = [0.0; 2] => -200.0..=200.0,
         /// Time of the flow when the scan begins, s; its first one if absent.
         time_s: Option<f64> = None => -1e9..=1e9,
         /// Place in the scene of the origin of the file's axes, m.
@@ -149,6 +151,8 @@ keys! {
         Frozen = "frozen",
         /// It moves from plane to plane; the planes must reach to the end of the scan.
         Moving = "moving",
+        /// As at the start of the scan, carried by `carried_m_s` (Taylor 1938); for `fields` only.
+        Carried = "carried",
     }
 
     /// Treatment of a line of sight where the wind is not known.
@@ -190,8 +194,30 @@ impl Flow {
 pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
     let key = |name: &str| format!("{at}.{name}");
     match flow {
-        Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) | Flow::Fields(_) => {}
+        Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => {}
+        Flow::Fields(flow) => {
+            let is_carried = flow.motion == SimulatedMotion::Carried;
+            let has_velocity = flow.carried_m_s != [0.0; 2];
+            let allowed = if is_carried {
+                "a velocity other than 0: motion = \"carried\" needs one"
+            } else {
+                "[0.0, 0.0]: another velocity needs motion = \"carried\""
+            };
+            let is_consistent = is_carried == has_velocity;
+            c.require(
+                is_consistent,
+                &key("carried_m_s"),
+                flow.carried_m_s,
+                allowed,
+            );
+        }
         Flow::Simulated(flow) => {
+            c.require(
+                flow.motion != SimulatedMotion::Carried,
+                &key("motion"),
+                flow.motion.name(),
+                "\"frozen\" or \"moving\" for cross-planes",
+            );
             if let Some(time_s) = flow.time_s {
                 c.require(
                     flow.age_tau.is_none(),

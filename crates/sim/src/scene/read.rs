@@ -324,6 +324,11 @@ mod tests {
         );
         assert!(message("[pulse]\nenergy_j = nan\n").contains("s.toml:2: pulse.energy_j = nan is"));
         assert!(message("[pulse\n").starts_with("s.toml:1: this is not valid TOML: "));
+        let twice = "[scan]\nrealisations = 1\nrange_max_m = 500.0\nrealisations = 2\n";
+        assert_eq!(
+            message(twice),
+            "s.toml:4: realisations: this is not valid TOML: duplicate key"
+        );
     }
 
     #[test]

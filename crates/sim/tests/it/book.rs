@@ -227,7 +227,7 @@ fn scenes_and_cases_that_pages_show_are_good() {
             let out = wakescope(temp.path(), words);
             let told = String::from_utf8_lossy(&out.stderr);
             let is_file_missing = told.contains("neither a file nor the beginning of files")
-                && block.contains("planes = ");
+                && (block.contains("planes = ") || block.contains("files = "));
             assert!(
                 out.status.success() || is_file_missing,
                 "{name}: {block}\n{told}"

@@ -33,9 +33,8 @@ fn sampled(nodes_m: [&[f64]; 3], component: usize, of: impl Fn([f64; 3]) -> [f64
     places.map(|p| of(p)[component]).collect()
 }
 
-#[test]
-fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
-    let folder = tempfile::tempdir().unwrap();
+/// Writes the field of 2 s as `wave.nc`.
+fn write_wave(folder: &Path) {
     let centre_m = [
         axis(-60.0, 60.0, 41),
         axis(220.0, 500.0, 95),
@@ -72,10 +71,16 @@ fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
         planes,
     };
     std::fs::write(
-        folder.path().join("wave.nc"),
+        folder.join("wave.nc"),
         cf_faces_parts(&faces, &origin).unwrap().into_bytes(),
     )
     .unwrap();
+}
+
+#[test]
+fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
+    let folder = tempfile::tempdir().unwrap();
+    write_wave(folder.path());
     let flow = "kind = \"fields\"\nfiles = \"wave.nc\"\nmotion = \"frozen\"\n";
     let scan = format!(
         "elevation_min_rad = 0.02\nelevation_max_rad = 0.08\nelevation_step_rad = 0.02\n{}",
@@ -112,6 +117,58 @@ fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
         message.contains("flow.files") && message.contains("the fields at 2.000 s: begin earlier"),
         "{message}"
     );
+}
+
+#[test]
+fn a_carried_field_is_the_field_with_a_moved_origin() {
+    let folder = tempfile::tempdir().unwrap();
+    write_wave(folder.path());
+    let scan = "elevation_min_rad = 0.02\nelevation_max_rad = 0.08\nelevation_step_rad = 0.02\nhead.dead_time_s = 0.1\n";
+    let planned = |motion: &str, turn: &str| {
+        let flow = format!("kind = \"fields\"\nfiles = \"wave.nc\"\n{turn}{motion}");
+        plan_in(folder.path(), [&flow, scan, ""], Target::Map)
+    };
+    let velocity_m_s = [100.0, 10.0];
+    for turn in ["", "rotation_rad = 0.02\n"] {
+        let motion = "motion = \"carried\"\ncarried_m_s = [100.0, 10.0]\n";
+        let plan = planned(motion, turn).unwrap();
+        let carried = map(&plan);
+        for line in 0..4 {
+            let time_s = plan.geometry.schedule.middle(line).time_s;
+            let [x_m, y_m] = velocity_m_s.map(|velocity_m_s| velocity_m_s * time_s);
+            let motion = format!("motion = \"frozen\"\norigin_m = [{x_m:?}, {y_m:?}, 0.0]\n");
+            let moved = map(&planned(&motion, turn).unwrap());
+            for (found, expected) in carried
+                .v_exact_m_s
+                .row(line)
+                .iter()
+                .zip(moved.v_exact_m_s.row(line))
+            {
+                assert!(
+                    (found - expected).abs() < 1e-9,
+                    "{line}: {found} {expected}"
+                );
+            }
+        }
+        assert!(plan.geometry.schedule.middle(3).time_s > 0.3);
+    }
+    // The field moves out of the scan: at which time is said.
+    let message = planned("motion = \"carried\"\ncarried_m_s = [0.0, 200.0]\n", "");
+    let message = message.unwrap_err().to_string();
+    assert!(
+        message.contains("s after the start of the scan (x = 0.00 m"),
+        "{message}"
+    );
+    for (motion, expected) in [
+        ("motion = \"carried\"\n", "a velocity other than 0"),
+        (
+            "motion = \"frozen\"\ncarried_m_s = [1.0, 0.0]\n",
+            "needs motion = \"carried\"",
+        ),
+    ] {
+        let message = planned(motion, "").unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}");
+    }
 }
 
 #[test]

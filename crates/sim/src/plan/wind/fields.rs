@@ -1,6 +1,7 @@
-//! Whole fields over time as the wind of a scene: read slice by slice, turned and moved to their place.
+//! Whole fields over time as the wind of a scene: read slice by slice, turned, moved to their place and carried by a mean wind.
 //!
-//! Check: a right-handed file with one vortex comes out unmirrored; a field off the cross-plane is what it says.
+//! Check: a carried field is the field with a moved origin; a right-handed file with one vortex comes out unmirrored; a field off
+//! the cross-plane is what it says.
 
 use crate::Error;
 use crate::beams::direction::sin_cos_of_turn;
@@ -14,20 +15,35 @@ use wakescope_les::{Error as LesError, Wind};
 /// A wind in axes of its own.
 struct Placed {
     wind: Box<dyn Wind>,
+    /// Position of the origin of the axes at `start_s`.
     origin_m: [f64; 3],
+    /// Velocity of the origin along x and y.
+    carried_m_s: [f64; 2],
+    start_s: f64,
     sin: f64,
     cos: f64,
     /// -1 where y of the file points to the left.
     side: f64,
 }
 
+/// Steps of a periodic direction may differ by this fraction: axes of turbulence boxes are often 32-bit numbers.
+const EQUAL_STEPS: f64 = 1e-3;
+
 /// Points that are turned at once.
 const BATCH: usize = 256;
 
 impl Placed {
-    /// A place of the scene in the axes of the file.
-    fn own_m(&self, [x, y, z]: &[f64; 3]) -> [f64; 3] {
-        let (sin, cos, [x0, y0, z0]) = (self.sin, self.cos, self.origin_m);
+    /// Position of the origin at a time: the hypothesis of Taylor (1938), (A8).
+    fn origin_m(&self, time_s: f64) -> [f64; 3] {
+        let [x, y, z] = self.origin_m;
+        let [u, v] = self.carried_m_s;
+        let later_s = time_s - self.start_s;
+        [x + u * later_s, y + v * later_s, z]
+    }
+
+    /// A position of the scene in the axes of the file, whose origin is at `origin_m`.
+    fn own_m(&self, [x, y, z]: &[f64; 3], origin_m: [f64; 3]) -> [f64; 3] {
+        let (sin, cos, [x0, y0, z0]) = (self.sin, self.cos, origin_m);
         let (x, y) = (x - x0, y - y0);
         [cos * x + sin * y, self.side * (cos * y - sin * x), z - z0]
     }
@@ -41,10 +57,11 @@ impl Wind for Placed {
         out_m_s: &mut [[f64; 3]],
     ) -> Result<(), LesError> {
         let (sin, cos) = (self.sin, self.cos);
+        let origin_m = self.origin_m(time_s);
         let mut turned = Vec::with_capacity(BATCH);
         for (points, outs) in points_m.chunks(BATCH).zip(out_m_s.chunks_mut(BATCH)) {
             turned.clear();
-            turned.extend(points.iter().map(|point_m| self.own_m(point_m)));
+            turned.extend(points.iter().map(|point_m| self.own_m(point_m, origin_m)));
             self.wind.velocity_into(&turned, time_s, outs)?;
             for out in outs {
                 let [u, v, w] = *out;
@@ -96,7 +113,7 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
         let step_m = second - first;
         if nodes_m
             .windows(2)
-            .any(|pair| (pair[1] - pair[0] - step_m).abs() > 1e-6 * step_m)
+            .any(|pair| (pair[1] - pair[0] - step_m).abs() > EQUAL_STEPS * step_m)
         {
             let needed = "a periodic direction needs nodes at equal distances, or an attribute edges = \"periodic LENGTH\"";
             return Err(refuse(needed.into()));
@@ -158,10 +175,10 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
     let (mut steepest_per_s, mut fastest_m_s) = (0.0_f64, 0.0_f64);
     let ends_s = [
         start_s,
-        if flow.motion == SimulatedMotion::Frozen {
-            start_s
-        } else {
+        if flow.motion == SimulatedMotion::Moving {
             last_s
+        } else {
+            start_s
         },
     ];
     let used = |i: usize| {
@@ -201,11 +218,16 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
     let found = SceneWind::of_files(Box::new(series), flow.motion, [start_s, last_s], source);
     let (sin, cos) = sin_cos_of_turn(flow.rotation_rad);
     let side = if flow.mirror_y { -1.0 } else { 1.0 };
-    let plain = flow.origin_m == [0.0; 3] && (sin, cos) == (0.0, 1.0) && !flow.mirror_y;
+    let plain = flow.origin_m == [0.0; 3]
+        && (sin, cos) == (0.0, 1.0)
+        && !flow.mirror_y
+        && flow.carried_m_s == [0.0; 2];
     let placed = |wind| {
         Box::new(Placed {
             wind,
             origin_m: flow.origin_m,
+            carried_m_s: flow.carried_m_s,
+            start_s,
             sin,
             cos,
             side,
