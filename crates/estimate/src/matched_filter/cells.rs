@@ -46,13 +46,10 @@ impl Cells {
         let (by_line, by_gate) = map.blocks(MOST_CELLS);
         let elevation_rad = block_means(map.elevation_rad, by_line);
         let range_m = block_means(map.range_m, by_gate);
-        let weight = |line: usize, gate: usize| {
-            let known = map.velocity_m_s[[line, gate]].is_finite();
-            known.then(|| map.deviation(line, gate).powi(-2))
-        };
+
         let mut sums = Array2::<f64>::zeros((elevation_rad.len(), range_m.len()));
         for (line, gate) in (0..lines).flat_map(|line| (0..gates).map(move |gate| (line, gate))) {
-            sums[[line / by_line, gate / by_gate]] += weight(line, gate).unwrap_or(0.0);
+            sums[[line / by_line, gate / by_gate]] += weight(map, line, gate).unwrap_or(0.0);
         }
         let mut cells = Vec::new();
         let mut index = Array2::from_elem(sums.raw_dim(), 0);
@@ -68,7 +65,7 @@ impl Cells {
         }
         let share = Array2::from_shape_fn((lines, gates), |(line, gate)| {
             let block = [line / by_line, gate / by_gate];
-            weight(line, gate).map(|weight| (index[block], weight / sums[block]))
+            weight(map, line, gate).map(|weight| (index[block], weight / sums[block]))
         });
         Self {
             elevation_rad,
@@ -107,6 +104,12 @@ impl Cells {
         }
         Ok(sums.into_iter().map(|(sum, weight)| sum / weight).collect())
     }
+}
+
+/// Reciprocal variance of a velocity; nothing where there is none.
+fn weight(map: &VelocityMap<'_>, line: usize, gate: usize) -> Option<f64> {
+    let is_known = map.velocity_m_s[[line, gate]].is_finite();
+    is_known.then(|| map.deviation(line, gate).powi(-2))
 }
 
 /// Makes the background of a map white, of unit variance.

@@ -90,66 +90,67 @@ pub(crate) fn levenberg_marquardt<P: Clone>(
 ) -> Option<Minimum<P>> {
     let is_secant = stop.curvature == Curvature::Secant;
     let mut at = start;
-    let mut here = evaluate(&at)?;
+    let mut normal = evaluate(&at)?;
     let mut damping = 1e-3;
-    let mut left = f64::INFINITY;
-    let end = |at, normal, iterations, sigmas_left| {
-        Some(Minimum {
-            at,
-            normal,
-            iterations,
-            sigmas_left,
-        })
-    };
-    for iteration in 1..=stop.iterations {
-        let down: Vec<f64> = here.gradient.iter().map(|g| -g).collect();
-        if let Some(newton) = solve(&here.curvature, &down) {
-            left = newton
-                .iter()
-                .zip(&down)
-                .map(|(s, d)| s * d)
-                .sum::<f64>()
-                .max(0.0)
-                .sqrt();
-            if left <= stop.sigmas {
-                return end(at, here, iteration, left);
+    let mut sigmas_left = f64::INFINITY;
+    let mut iterations = 0;
+    while iterations < stop.iterations && damping <= 1e12 {
+        iterations += 1;
+        let down: Vec<f64> = normal.gradient.iter().map(|g| -g).collect();
+        if let Some(newton) = solve(&normal.curvature, &down) {
+            sigmas_left = product(&newton, &down).max(0.0).sqrt();
+            if sigmas_left <= stop.sigmas {
+                break;
             }
         }
-        let mut damped = here.curvature.clone();
-        damped.diag_mut().mapv_inplace(|d| d * (1.0 + damping));
-        let mut step = solve(&damped, &down);
-        if let (true, Some(step)) = (is_secant && left > LONGEST_SIGMAS, &mut step) {
-            step.iter_mut().for_each(|s| *s *= LONGEST_SIGMAS / left);
+        let mut step = damped_step(&normal, &down, damping);
+        if let Some(step) = step
+            .as_mut()
+            .filter(|_| is_secant && sigmas_left > LONGEST_SIGMAS)
+        {
+            step.iter_mut()
+                .for_each(|s| *s *= LONGEST_SIGMAS / sigmas_left);
         }
         let trial = step.as_ref().map(|step| moved(&at, step));
-        let there = trial.as_ref().and_then(&mut evaluate);
+        let trial_normal = trial.as_ref().and_then(&mut evaluate);
         // gain promised by the quadratic model
-        let promised = step.map_or(0.0, |s| {
-            0.5 * s.iter().zip(&down).map(|(s, d)| s * d).sum::<f64>()
-        });
-        match (trial, there) {
-            (Some(trial), Some(there)) if here.cost - there.cost > 1e-4 * promised => {
-                let ratio = (here.cost - there.cost) / promised;
-                damping = if ratio > 0.75 {
-                    (damping * 0.1).max(1e-9)
-                } else {
-                    damping
-                };
+        let promised = step.map_or(0.0, |step| 0.5 * product(&step, &down));
+        match (trial, trial_normal) {
+            (Some(trial), Some(trial_normal))
+                if normal.cost - trial_normal.cost > 1e-4 * promised =>
+            {
+                let ratio = (normal.cost - trial_normal.cost) / promised;
+                if ratio > 0.75 {
+                    damping = (damping * 0.1).max(1e-9);
+                }
                 at = trial;
-                here = there;
+                normal = trial_normal;
             }
-            (_, refused) => {
-                if let (true, Some(refused)) = (is_secant, refused) {
-                    here.curvature = refused.curvature;
+            (_, rejected) => {
+                if let Some(rejected) = rejected.filter(|_| is_secant) {
+                    normal.curvature = rejected.curvature;
                 }
                 damping = (damping * 10.0).max(1e-4);
             }
         }
-        if damping > 1e12 {
-            return end(at, here, iteration, left);
-        }
     }
-    end(at, here, stop.iterations, left)
+    Some(Minimum {
+        at,
+        normal,
+        iterations,
+        sigmas_left,
+    })
+}
+
+/// Step of the quadratic model with a curvature whose diagonal is larger by the damping; nothing if the curvature is singular.
+fn damped_step(normal: &Normal, down: &[f64], damping: f64) -> Option<Vec<f64>> {
+    let mut damped = normal.curvature.clone();
+    damped.diag_mut().mapv_inplace(|d| d * (1.0 + damping));
+    solve(&damped, down)
+}
+
+fn product(step: &[f64], down: &[f64]) -> f64 {
+    step.iter().zip(down).map(|(s, d)| s * d).sum()
 }
 
 #[cfg(test)]

@@ -67,14 +67,8 @@ impl Bank {
         options: &DetectorOptions,
     ) -> Self {
         let spacing_m = options.spacing_m;
-        let between = |of: fn(&(f64, f64)) -> f64| {
-            let values = cells.cells.iter().map(|cell| of(&cell.place_m));
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-                (low.min(x), high.max(x))
-            })
-        };
-        let across_m = between(|place| place.0);
-        let mut up_m = between(|place| place.1);
+        let across_m = extent(cells.cells.iter().map(|cell| cell.place_m.0));
+        let mut up_m = extent(cells.cells.iter().map(|cell| cell.place_m.1));
         if model.images {
             up_m.0 = up_m.0.max(STEP_M);
         }
@@ -121,6 +115,13 @@ impl Bank {
             templates,
         }
     }
+}
+
+/// Smallest and largest of some numbers.
+fn extent(numbers: impl Iterator<Item = f64>) -> (f64, f64) {
+    numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+        (low.min(x), high.max(x))
+    })
 }
 
 #[cfg(test)]

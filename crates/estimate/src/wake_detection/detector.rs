@@ -135,9 +135,8 @@ impl WakeDetector {
         let products = self.filter.shapes.dot(&white);
         let (value, best) = self.best(products.view());
         let rest = white.dot(&white);
-        let dof = |fitted: usize| {
-            (self.filter.cells.cells.len() - missing - self.filter.wind.ncols() - fitted) as f64
-        };
+        let wind_dof = self.filter.cells.cells.len() - missing - self.filter.wind.ncols();
+        let wake_dof = wind_dof - 4;
         let length = self.reciprocal_length[best];
         let template = &self.bank.templates[best];
         let mut left = white;
@@ -153,8 +152,8 @@ impl WakeDetector {
             value,
             neighbour_correlation: (along.0, across.0),
             correlation_error: (along.1, across.1),
-            wind_chi2_per_dof: rest / dof(0),
-            wake_chi2_per_dof: (rest - value) / dof(4),
+            wind_chi2_per_dof: rest / wind_dof as f64,
+            wake_chi2_per_dof: (rest - value) / wake_dof as f64,
             wake: self.wake(template, value.sqrt() * length),
             circulation_std_m2_s: length,
         })
@@ -165,13 +164,13 @@ impl WakeDetector {
         let missing = means.iter().filter(|value| value.is_nan()).count();
         enough_velocities(means.len() - missing, means.len() - means.len() / MISSING)?;
         let cells = &self.filter.cells.cells;
-        let row =
-            |i: usize| wind_velocities(&self.filter.cells, i).map(|x| x / cells[i].deviation_m_s);
+
         let mut curvature = Array2::zeros((2, 2));
         let mut towards = [0.0; 2];
         for i in (0..means.len()).filter(|&i| means[i].is_finite()) {
-            let row = row(i);
-            let value = means[i] / cells[i].deviation_m_s;
+            let deviation_m_s = cells[i].deviation_m_s;
+            let row = wind_velocities(&self.filter.cells, i).map(|x| x / deviation_m_s);
+            let value = means[i] / deviation_m_s;
             for a in 0..2 {
                 towards[a] += row[a] * value;
                 (0..2).for_each(|b| curvature[[a, b]] += row[a] * row[b]);
@@ -211,16 +210,9 @@ impl WakeDetector {
                 grid[[cell.line, cell.gate]] = *number;
             }
         }
-        let mean = |products: ndarray::Array2<f64>| {
-            let (sum, count) = products
-                .iter()
-                .filter(|x| x.is_finite())
-                .fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
-            (sum / count, count)
-        };
-        let (power, _) = mean(&grid * &grid);
-        let along = mean(&grid.slice(s![.., 1..]) * &grid.slice(s![.., ..-1]));
-        let across = mean(&grid.slice(s![1.., ..]) * &grid.slice(s![..-1, ..]));
+        let (power, _) = finite_mean(&(&grid * &grid));
+        let along = finite_mean(&(&grid.slice(s![.., 1..]) * &grid.slice(s![.., ..-1])));
+        let across = finite_mean(&(&grid.slice(s![1.., ..]) * &grid.slice(s![..-1, ..])));
         [along, across].map(|(product, count): (f64, f64)| (product / power, count.sqrt().recip()))
     }
 
@@ -236,15 +228,12 @@ impl WakeDetector {
 
     /// How well each wake of the bank explains a scan, given its products with all places; the statistic is the square of the largest.
     pub(super) fn scores(&self, products: ArrayView1<'_, f64>) -> impl Iterator<Item = f64> {
-        let score = move |(&[left, right], length): (&Template, &f64)| {
-            let of = |place: Option<usize>| place.map_or(0.0, |place| products[place]);
-            (of(right) - of(left)) * length
-        };
-        self.bank
-            .templates
-            .iter()
-            .zip(&self.reciprocal_length)
-            .map(score)
+        let templates = self.bank.templates.iter().zip(&self.reciprocal_length);
+        templates.map(move |(&[left, right], length)| {
+            let left = left.map_or(0.0, |place| products[place]);
+            let right = right.map_or(0.0, |place| products[place]);
+            (right - left) * length
+        })
     }
 
     /// Products of what a wake shows with all places, and its length: the reciprocal of the standard deviation of a factor on its
@@ -255,21 +244,24 @@ impl WakeDetector {
     }
 
     fn wake(&self, &[left, right]: &Template, circulation_m2_s: f64) -> Wake {
-        let other = left.or(right).unwrap_or(0);
-        let vortex = |place: Option<usize>, sense: f64| {
-            let (lateral_m, height_m) = self.bank.places_m[place.unwrap_or(other)];
-            let (away_m, circulation_m2_s) = place
-                .map_or((sense * self.bank.step_m.0, 0.0), |_| {
-                    (0.0, circulation_m2_s)
-                });
-            Vortex::at(
-                (lateral_m + away_m, height_m),
-                circulation_m2_s,
-                self.bank.core_m,
-            )
-        };
-        Wake::calm(vortex(left, -1.0), vortex(right, 1.0))
+        let [left, right] = [(left, right, -1.0), (right, left, 1.0)].map(|(own, other, sense)| {
+            let place = own.or(other).unwrap_or(0);
+            let (mut lateral_m, height_m) = self.bank.places_m[place];
+            if own.is_none() {
+                lateral_m += sense * self.bank.step_m.0;
+            }
+            let circulation_m2_s = own.map_or(0.0, |_| circulation_m2_s);
+            Vortex::at((lateral_m, height_m), circulation_m2_s, self.bank.core_m)
+        });
+        Wake::calm(left, right)
     }
+}
+
+/// Mean of the finite products and their number.
+fn finite_mean(products: &Array2<f64>) -> (f64, f64) {
+    let finite = products.iter().filter(|x| x.is_finite());
+    let (sum, count) = finite.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
+    (sum / count, count)
 }
 
 /// The weight of a gate on a grid that is fine enough for wakes of the bank.
@@ -290,6 +282,7 @@ fn kernel(gate: &Gate) -> Result<RangeKernel, Error> {
 
 /// Square of the length of what a wake of unit circulation shows, from the products of single vortices.
 fn length2(&[left, right]: &Template, gram: &Array2<f64>) -> f64 {
-    let of = |a: Option<usize>, b: Option<usize>| a.zip(b).map_or(0.0, |(a, b)| gram[[a, b]]);
-    of(left, left) + of(right, right) - 2.0 * of(left, right)
+    let [of_left, of_right, of_both] = [(left, left), (right, right), (left, right)]
+        .map(|(a, b)| a.zip(b).map_or(0.0, |(a, b)| gram[[a, b]]));
+    of_left + of_right - 2.0 * of_both
 }

@@ -33,27 +33,30 @@ impl WakeDetector {
     /// So many pairs of unit circulation: each as far apart as any that are asked for, anywhere in the scan with both vortices in it, with
     /// cores of 5 % of their spacing. Fewer where the scan has hardly room for a pair.
     pub fn draw_wakes<R: Rng>(&self, count: usize, stream: impl Fn(u64) -> R) -> Vec<Wake> {
-        let draw = |index: usize| {
-            let mut generator = stream(index as u64);
-            let mut between =
-                |(low, high): (f64, f64)| low + (high - low) * generator.random::<f64>();
-            (0..TRIES.0).find_map(|_| {
-                let spacing_m = between(self.spacing_m);
-                (0..TRIES.1).find_map(|_| {
-                    let left_m = between(self.bank.lateral_m);
-                    let height_m = between(self.bank.up_m);
-                    let places_m =
-                        [left_m, left_m + spacing_m].map(|lateral_m| (lateral_m, height_m));
-                    let [left, right] =
-                        places_m.map(|place_m| Vortex::at(place_m, 1.0, 0.05 * spacing_m));
-                    places_m
-                        .iter()
-                        .all(|at_m| self.filter.cells.hold(&self.filter.model, *at_m))
-                        .then(|| Wake::calm(left, right))
-                })
-            })
-        };
-        (0..count).map_while(draw).collect()
+        (0..count)
+            .map_while(|index| self.draw_wake(&mut stream(index as u64)))
+            .collect()
+    }
+
+    /// One pair of unit circulation in the scan; nothing if none is found in so many tries.
+    fn draw_wake<R: Rng>(&self, generator: &mut R) -> Option<Wake> {
+        for _ in 0..TRIES.0 {
+            let spacing_m = uniform(generator, self.spacing_m);
+            for _ in 0..TRIES.1 {
+                let left_m = uniform(generator, self.bank.lateral_m);
+                let height_m = uniform(generator, self.bank.up_m);
+                let [left, right] = [left_m, left_m + spacing_m]
+                    .map(|lateral_m| Vortex::at((lateral_m, height_m), 1.0, 0.05 * spacing_m));
+                let are_in_scan = [left, right].iter().all(|vortex| {
+                    let cells = &self.filter.cells;
+                    cells.hold(&self.filter.model, vortex.place_m())
+                });
+                if are_in_scan {
+                    return Some(Wake::calm(left, right));
+                }
+            }
+        }
+        None
     }
 
     /// Trials with the given wakes, in turn, in so many drawn backgrounds.
@@ -91,18 +94,13 @@ impl DetectionTrials<'_> {
     /// Statistics of all trials with wakes of that circulation \[m^2/s\].
     #[must_use]
     pub fn statistics(&self, circulation_m2_s: f64) -> Vec<f64> {
-        let trial = |(i, empty): (usize, ndarray::ArrayView1<'_, f64>)| {
+        let mut statistics = Vec::with_capacity(self.empty.nrows());
+        for (i, empty) in self.empty.rows().into_iter().enumerate() {
             let wake = &self.wakes[i % self.wakes.len()];
-            self.detector
-                .best((&empty + circulation_m2_s * wake).view())
-                .0
-        };
-        self.empty
-            .rows()
-            .into_iter()
-            .enumerate()
-            .map(trial)
-            .collect()
+            let products = &empty + circulation_m2_s * wake;
+            statistics.push(self.detector.best(products.view()).0);
+        }
+        statistics
     }
 
     /// Shares of the wakes of each circulation \[m^2/s\] whose statistic exceeds a threshold, which must not be negative.
@@ -124,9 +122,10 @@ impl DetectionTrials<'_> {
             .iter()
             .map(|wake| self.detector.scores(wake.view()).collect())
             .collect();
-        let trial = |(i, empty): (usize, ndarray::ArrayView1<'_, f64>)| {
+        let mut missed = Vec::with_capacity(self.empty.nrows());
+        for (i, empty) in self.empty.rows().into_iter().enumerate() {
             let lines = self.detector.scores(empty).zip(&slopes[i % slopes.len()]);
-            lines.fold(
+            missed.push(lines.fold(
                 [f64::NEG_INFINITY, f64::INFINITY],
                 |[low, high], (score, slope)| match (root - score) / slope {
                     reached if *slope > 0.0 => [low, high.min(reached)],
@@ -134,14 +133,9 @@ impl DetectionTrials<'_> {
                     _ if score > root => [f64::INFINITY, f64::NEG_INFINITY],
                     _ => [low, high],
                 },
-            )
-        };
-        self.empty
-            .rows()
-            .into_iter()
-            .enumerate()
-            .map(trial)
-            .collect()
+            ));
+        }
+        missed
     }
 
     /// Bound on the circulation of the wakes were their places known \[m^2/s\], root mean square.
@@ -157,20 +151,14 @@ impl DetectionTrials<'_> {
     pub fn smallest_detectable_m2_s(&self, threshold: f64) -> [f64; 3] {
         let foretold = self.circulation_std_m2_s() * (threshold.max(0.0).sqrt() + NINE_OF_TEN);
         let missed = self.missed_m2_s(threshold);
-        let of_group = |group: usize| {
-            let own = |i: &usize| i % self.wakes.len() % GROUPS == group;
-            found_nine_times(
-                &(0..missed.len())
-                    .filter(own)
-                    .map(|i| missed[i])
-                    .collect::<Vec<_>>(),
-                foretold,
-            )
-        };
-        let groups: Vec<f64> = (0..GROUPS)
-            .filter(|_| self.wakes.len() >= 2 * GROUPS)
-            .map(of_group)
-            .collect();
+        let mut groups = Vec::new();
+        for group in (0..GROUPS).filter(|_| self.wakes.len() >= 2 * GROUPS) {
+            let of_group: Vec<[f64; 2]> = (0..missed.len())
+                .filter(|i| i % self.wakes.len() % GROUPS == group)
+                .map(|i| missed[i])
+                .collect();
+            groups.push(found_nine_times(&of_group, foretold));
+        }
         let count = groups.len() as f64;
         let mean = groups.iter().sum::<f64>() / count;
         let squares: f64 = groups.iter().map(|x| (x - mean).powi(2)).sum();
@@ -202,9 +190,14 @@ fn found_nine_times(missed: &[[f64; 2]], about: f64) -> f64 {
 
 /// Share of trials that find a circulation, of those between which each misses it.
 fn share(missed_m2_s: &[[f64; 2]], circulation_m2_s: f64) -> Measured {
-    let is_missed = |[low, high]: &&[f64; 2]| (*low..=*high).contains(&circulation_m2_s);
-    Measured::share(
-        missed_m2_s.len() - missed_m2_s.iter().filter(is_missed).count(),
-        missed_m2_s.len(),
-    )
+    let misses = missed_m2_s
+        .iter()
+        .filter(|[low, high]| (*low..=*high).contains(&circulation_m2_s))
+        .count();
+    Measured::share(missed_m2_s.len() - misses, missed_m2_s.len())
+}
+
+/// A number between two others.
+fn uniform<R: Rng>(generator: &mut R, (low, high): (f64, f64)) -> f64 {
+    low + (high - low) * generator.random::<f64>()
 }

@@ -16,20 +16,18 @@ pub(crate) struct Cell {
 
 /// The velocities that there are, each with its stated deviation.
 pub(crate) fn cells(map: &VelocityMap<'_>) -> Vec<Cell> {
-    let cell = |((line, gate), velocity_m_s): ((usize, usize), &f64)| {
-        let sigma_m_s = map.deviation(line, gate);
-        Cell {
-            line,
-            gate,
-            velocity_m_s: *velocity_m_s,
-            sigma_m_s,
+    let mut cells = Vec::new();
+    for ((line, gate), &velocity_m_s) in map.velocity_m_s.indexed_iter() {
+        if velocity_m_s.is_finite() {
+            cells.push(Cell {
+                line,
+                gate,
+                velocity_m_s,
+                sigma_m_s: map.deviation(line, gate),
+            });
         }
-    };
-    map.velocity_m_s
-        .indexed_iter()
-        .map(cell)
-        .filter(|cell| cell.velocity_m_s.is_finite())
-        .collect()
+    }
+    cells
 }
 
 /// Numbers times their weights.

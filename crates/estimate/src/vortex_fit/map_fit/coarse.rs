@@ -52,12 +52,14 @@ impl Coarse {
     }
 
     fn at(map: &VelocityMap<'_>, lines: Vec<usize>, gates: Vec<usize>, line_step: usize) -> Self {
-        let some = |all: ArrayView2<'_, f64>| all.select(Axis(0), &lines).select(Axis(1), &gates);
+        let elevation_rad = lines.iter().map(|&line| map.elevation_rad[line]).collect();
+        let range_m = gates.iter().map(|&gate| map.range_m[gate]).collect();
+        let deviation_m_s = map.standard_deviation_m_s;
         Self {
-            elevation_rad: lines.iter().map(|&line| map.elevation_rad[line]).collect(),
-            range_m: gates.iter().map(|&gate| map.range_m[gate]).collect(),
-            velocity_m_s: some(map.velocity_m_s),
-            standard_deviation_m_s: map.standard_deviation_m_s.map(some),
+            elevation_rad,
+            range_m,
+            velocity_m_s: selected(map.velocity_m_s, &lines, &gates),
+            standard_deviation_m_s: deviation_m_s.map(|all| selected(all, &lines, &gates)),
             line_step,
             lines,
             gates,
@@ -80,13 +82,8 @@ impl Coarse {
     /// Numbers of these places at all places of a map of that size: linear between, and beyond the outermost as there. Numbers
     /// that are not finite are left out.
     pub(crate) fn everywhere(&self, some: &Array2<f64>, size: (usize, usize)) -> Array2<f64> {
-        let about = |chosen: &[usize], count: usize| {
-            (0..count)
-                .map(|at| neighbours(chosen, at))
-                .collect::<Vec<_>>()
-        };
-        let lines = about(&self.lines, size.0);
-        let gates = about(&self.gates, size.1);
+        let lines: Vec<_> = (0..size.0).map(|at| neighbours(&self.lines, at)).collect();
+        let gates: Vec<_> = (0..size.1).map(|at| neighbours(&self.gates, at)).collect();
         Array2::from_shape_fn(size, |(line, gate)| {
             let [mut sum, mut shares] = [0.0; 2];
             for (i, by_line) in lines[line] {
@@ -102,6 +99,10 @@ impl Coarse {
             sum / shares
         })
     }
+}
+
+fn selected(all: ArrayView2<'_, f64>, lines: &[usize], gates: &[usize]) -> Array2<f64> {
+    all.select(Axis(0), lines).select(Axis(1), gates)
 }
 
 /// At most every `step`th of `count` places, about the middle: from one to the next, and which.

@@ -134,6 +134,15 @@ impl VelocityMap<'_> {
     }
 }
 
+/// Index of the number of an axis that is nearest to `value`, the first of several; nothing for an empty axis.
+pub(crate) fn nearest_index(axis: &[f64], value: f64) -> Option<usize> {
+    (0..axis.len()).min_by(|a, b| {
+        (axis[*a] - value)
+            .abs()
+            .total_cmp(&(axis[*b] - value).abs())
+    })
+}
+
 /// A velocity map that owns its data: medians over blocks of another one.
 pub(crate) struct BlockMedians {
     pub(crate) elevation_rad: Vec<f64>,

@@ -23,7 +23,7 @@ use crate::vortex_fit::tolerances::{
 use crate::vortex_fit::top::distinct;
 use crate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, SecondaryVortices,
-    Sharing, VelocityMap, Vortex, Wake, WakeModel,
+    Sharing, VelocityMap, Wake, WakeModel,
 };
 
 /// The least core radius over a region's radius, or over the distance of lines.
@@ -57,9 +57,11 @@ pub fn fit_map(
         options,
         least_core_m: 0.0,
     };
-    let refine = |start: &Wake| setting.descended(start, MEANS);
-    with_typical_core(best_of(&starts(guess, options), refine)?, options, refine)?
-        .standing_out(options.least_statistic)
+    let best = best_of(&starts(guess, options), |start| {
+        setting.descended(start, MEANS)
+    })?;
+    let fit = with_typical_core(best, options, |start| setting.descended(start, MEANS))?;
+    fit.standing_out(options.least_statistic)
 }
 
 /// Fits the wake to a map that an estimator of this crate made, without any prior knowledge: as [`fit_map`] with its mean gate, then
@@ -75,35 +77,22 @@ pub fn fit_map_of_estimator(
     options: &MapFitOptions,
 ) -> Result<MapFit, Error> {
     map.validate()?;
-    let all = Shown::new(map, model, response, options, 1.0)?;
-    let guesses = first_guesses(map, model, &all.prepared.kernel, options.least_statistic)?;
-    let coarse = all.coarse(LINES_OVER_RADIUS[0]);
-    let few = coarse.as_ref().map(|coarse| all.at(coarse)).transpose()?;
-    let about = match &few {
-        Some(few) => few.ends_of_means(&guesses, &few.prepared.kernel),
-        None => all.ends_of_means(&guesses, &all.prepared.kernel.coarser(2)),
+    let full = EstimatorPrediction::new(map, model, response, options, 1.0)?;
+    let guesses = first_guesses(map, model, &full.prepared.kernel, options.least_statistic)?;
+    let coarse = full.coarse(LINES_OVER_RADIUS[0]);
+    let thinned = coarse.as_ref().map(|coarse| full.at(coarse)).transpose()?;
+    let about = match &thinned {
+        Some(thinned) => thinned.ends_of_means(&guesses, &thinned.prepared.kernel),
+        None => full.ends_of_means(&guesses, &full.prepared.kernel.coarser(2)),
     };
-    let for_slopes = all.coarse(LINES_OVER_RADIUS[1]);
-    let all = all.with_slopes_at(for_slopes.as_ref())?;
-    let refine = |start: &Wake| all.setting().refined(start, ESTIMATES);
-    let from = |about: &[Wake]| {
-        let starts: Vec<Wake> = about
-            .iter()
-            .flat_map(|about| starts(about, options))
-            .collect();
-        // where a map cannot be thinned its own rough ends tell which starts lead to one end, and which nowhere
-        let ends = match &few {
-            Some(few) => few.ends(&starts, COARSE_ESTIMATES),
-            None if starts.len() > 1 => all.ends(&starts, SHORT_ESTIMATES),
-            None => Vec::new(),
-        };
-        best_of(if ends.is_empty() { &starts } else { &ends }, refine)
-    };
-    let fit = match from(&about) {
-        Err(Error::NotConverged { .. }) => from(&guesses),
+    let for_slopes = full.coarse(LINES_OVER_RADIUS[1]);
+    let full = full.with_slopes_at(for_slopes.as_ref())?;
+    let best = match full.best_about(&about, thinned.as_ref()) {
+        Err(Error::NotConverged { .. }) => full.best_about(&guesses, thinned.as_ref()),
         first => first,
     };
-    with_typical_core(fit?, options, refine)?.standing_out(options.least_statistic)
+    let fit = with_typical_core(best?, options, |start| full.refined(start, ESTIMATES))?;
+    fit.standing_out(options.least_statistic)
 }
 
 /// Fits the wake to a map that an estimator made, from a given start on: what is expected of a wake is the estimate from its
@@ -119,10 +108,9 @@ pub fn refine_map_fit_of_estimator(
     options: &MapFitOptions,
 ) -> Result<MapFit, Error> {
     map.validate()?;
-    let all = Shown::new(map, model, response, options, 1.0)?;
-    let for_slopes = all.coarse(LINES_OVER_RADIUS[1]);
-    all.with_slopes_at(for_slopes.as_ref())?
-        .setting()
+    let full = EstimatorPrediction::new(map, model, response, options, 1.0)?;
+    let for_slopes = full.coarse(LINES_OVER_RADIUS[1]);
+    full.with_slopes_at(for_slopes.as_ref())?
         .refined(guess, ESTIMATES)
 }
 
@@ -141,12 +129,12 @@ pub fn fit_secondary_vortices(
 ) -> Result<Option<(Option<MapFit>, SecondaryVortices)>, Error> {
     map.validate()?;
     pair.validate()?;
-    let all = Shown::new(map, model, response, options, 1.0)?;
-    let coarse = all.coarse(LINES_OVER_RADIUS[0]);
-    let few = coarse.as_ref().map(|coarse| all.at(coarse)).transpose()?;
-    let found = few.as_ref().map_or_else(
-        || all.setting().with_secondary(pair),
-        |few| few.setting().with_secondary(pair),
+    let full = EstimatorPrediction::new(map, model, response, options, 1.0)?;
+    let coarse = full.coarse(LINES_OVER_RADIUS[0]);
+    let thinned = coarse.as_ref().map(|coarse| full.at(coarse)).transpose()?;
+    let found = thinned.as_ref().map_or_else(
+        || full.setting().with_secondary(pair),
+        |thinned| thinned.setting().with_secondary(pair),
     );
     let Some(found) = found else { return Ok(None) };
     if !found.secondary.fitted {
@@ -186,7 +174,7 @@ pub fn with_local_circulations(
             vortices[side].away_m(model.position_m(map.range_m[gate], map.elevation_rad[line]))
                 < REACH_M
         });
-        let shown = Shown::new(&near.map(), model, response, options, 1.0).ok()?;
+        let shown = EstimatorPrediction::new(&near.map(), model, response, options, 1.0).ok()?;
         shown
             .setting()
             .local_circulation(&pair.wake, side, ESTIMATES)
@@ -195,7 +183,7 @@ pub fn with_local_circulations(
 }
 
 /// A map, and what an estimator shows at its places.
-struct Shown<'a, 'm> {
+struct EstimatorPrediction<'a, 'm> {
     map: VelocityMap<'m>,
     prepared: Prepared<'a>,
     /// Some places at which slopes are taken, if not at all of them; between they are linear.
@@ -205,7 +193,7 @@ struct Shown<'a, 'm> {
     least_core_m: f64,
 }
 
-impl<'a, 'm: 'a> Shown<'a, 'm> {
+impl<'a, 'm: 'a> EstimatorPrediction<'a, 'm> {
     /// With nodes of the air `coarser` times as far apart as need be.
     fn new(
         map: &VelocityMap<'m>,
@@ -239,7 +227,7 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
     }
 
     /// What the estimator shows at some of the places.
-    fn at<'c>(&self, places: &'c Coarse) -> Result<Shown<'c, 'c>, Error>
+    fn at<'c>(&self, places: &'c Coarse) -> Result<EstimatorPrediction<'c, 'c>, Error>
     where
         'a: 'c,
     {
@@ -248,7 +236,7 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
             correlated_lines,
             ..self.options
         };
-        Shown::new(
+        EstimatorPrediction::new(
             &places.map(),
             self.prepared.model,
             self.prepared.response,
@@ -310,8 +298,10 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
             let end = setting.descended(guess, MEANS_START).ok();
             let end = end.map(|fit| fit.wake);
             ends.extend(end);
-            let is_in_map = |vortex: &Vortex| model.sees(sector, vortex.place_m());
-            if !end.is_some_and(|end| is_in_map(&end.left) && is_in_map(&end.right)) {
+            let is_in_map = end.is_some_and(|end| {
+                model.sees(sector, end.left.place_m()) && model.sees(sector, end.right.place_m())
+            });
+            if !is_in_map {
                 ends.push(*guess);
             }
         }
@@ -320,28 +310,55 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
 
     /// Where the fits from some starts end that do, without those that are one.
     fn ends(&self, starts: &[Wake], stop: StoppingRule) -> Vec<Wake> {
-        let refine = |start: &Wake| self.setting().refined(start, stop);
-        let end = |start: &Wake| with_typical_core(refine(start)?, &self.options, refine);
-        rivals(starts.iter().filter_map(|start| end(start).ok()).collect())
+        let mut ends = Vec::new();
+        for start in starts {
+            let end = self.refined(start, stop).and_then(|end| {
+                with_typical_core(end, &self.options, |start| self.refined(start, stop))
+            });
+            ends.extend(end);
+        }
+        rivals(ends)
+    }
+
+    /// The fit by steps of Gauss and Newton from a start on.
+    fn refined(&self, start: &Wake, stop: StoppingRule) -> Result<MapFit, Error> {
+        self.setting().refined(start, stop)
+    }
+
+    /// The best of the fits from the starts about some wakes, by way of rough fits: to the `thinned` map or, where the map cannot be
+    /// thinned, to itself, which shows the starts that lead to one minimum and those that lead nowhere.
+    fn best_about(
+        &self,
+        wakes: &[Wake],
+        thinned: Option<&EstimatorPrediction<'_, '_>>,
+    ) -> Result<MapFit, Error> {
+        let starts: Vec<Wake> = wakes
+            .iter()
+            .flat_map(|about| starts(about, &self.options))
+            .collect();
+        let ends = match thinned {
+            Some(thinned) => thinned.ends(&starts, COARSE_ESTIMATES),
+            None if starts.len() > 1 => self.ends(&starts, SHORT_ESTIMATES),
+            None => Vec::new(),
+        };
+        let starts = if ends.is_empty() { starts } else { ends };
+        best_of(&starts, |start| self.refined(start, ESTIMATES))
     }
 }
 
-impl Prediction for Shown<'_, '_> {
+impl Prediction for EstimatorPrediction<'_, '_> {
     fn allows(&self, p: &[f64]) -> bool {
         self.prepared.model.allows(p)
     }
 
     fn predict(&self, p: &[f64], groups: &[Vec<usize>]) -> Predicted {
-        let of = |prepared: &Prepared<'_>, p: &[f64]| {
-            let (model, wake) = prepared.model.with(p);
-            prepared.velocities(&model, &wake)
-        };
-        let velocity_m_s = of(&self.prepared, p);
+        let velocity_m_s = self.prepared.velocities_of(p);
         let slopes = match &self.slopes_at {
-            None => quotients(|p| of(&self.prepared, p), p, &velocity_m_s, groups),
+            None => quotients(|p| self.prepared.velocities_of(p), p, &velocity_m_s, groups),
             Some(_) if groups.is_empty() => Vec::new(),
-            Some((coarse, few)) => {
-                let slopes = quotients(|p| of(few, p), p, &of(few, p), groups);
+            Some((coarse, thinned)) => {
+                let here = thinned.velocities_of(p);
+                let slopes = quotients(|p| thinned.velocities_of(p), p, &here, groups);
                 slopes
                     .iter()
                     .map(|slope| coarse.everywhere(slope, velocity_m_s.dim()))
@@ -418,7 +435,7 @@ mod tests {
             velocity_m_s: velocity_m_s.view(),
             standard_deviation_m_s: None,
         };
-        let whole = Shown::new(&map, &model, &response, &options, 1.0).unwrap();
+        let whole = EstimatorPrediction::new(&map, &model, &response, &options, 1.0).unwrap();
         let coarse = whole.coarse(LINES_OVER_RADIUS[1]).unwrap();
         assert!(2 * coarse.map().velocity_m_s.len() <= velocity_m_s.len());
         let groups = options.free.groups();

@@ -22,6 +22,7 @@ use crate::estimators::Estimator;
 use crate::linalg::dot;
 use crate::parallel::{map_each, map_indexed};
 use crate::spectrum::{Correlogram, Taper};
+use crate::vortex_fit::map_fit::cells::scaled;
 use crate::vortex_fit::wake::motion::Motion;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::wake_map::region;
@@ -122,12 +123,9 @@ impl<'a> EstimatorResponse<'a> {
     /// wake is given for. A line that is none of these sees it as it is then.
     #[must_use]
     pub fn moving(self, elevation_rad: &[f64], seconds: &[f64]) -> Self {
+        let elevations = elevation_rad.iter().copied();
         Self {
-            line_times: elevation_rad
-                .iter()
-                .copied()
-                .zip(seconds.iter().copied())
-                .collect(),
+            line_times: elevations.zip(seconds.iter().copied()).collect(),
             ..self
         }
     }
@@ -201,14 +199,10 @@ impl<'a> EstimatorResponse<'a> {
             spacing_m,
             &of_lag_0,
         )?;
-        let seconds_of = |elevation_rad: &f64| {
-            let line = self
-                .line_times
-                .iter()
-                .find(|(elevation, _)| elevation == elevation_rad);
-            line.map_or(0.0, |(_, seconds)| *seconds)
-        };
-        let seconds = elevation_rad.iter().map(seconds_of).collect();
+        let seconds = elevation_rad
+            .iter()
+            .map(|elevation_rad| self.seconds_after(*elevation_rad))
+            .collect();
         Ok(Prepared {
             response: self,
             model,
@@ -220,6 +214,13 @@ impl<'a> EstimatorResponse<'a> {
             regions,
             seconds,
         })
+    }
+
+    /// Time \[s\] of the line at an elevation after that of the wake; 0 for a line without a time.
+    fn seconds_after(&self, elevation_rad: f64) -> f64 {
+        let mut lines = self.line_times.iter();
+        let line = lines.find(|(elevation, _)| *elevation == elevation_rad);
+        line.map_or(0.0, |(_, seconds)| *seconds)
     }
 
     /// Distance of nodes of the air \[m\]: gates at those ranges fall on them unless they are so close that this would take many more.
@@ -245,22 +246,15 @@ impl<'a> EstimatorResponse<'a> {
             .collect();
         let mut tapered: Vec<Vec<f64>> = Vec::new();
         for taper in &self.tapers {
-            tapered.push(
-                taper
-                    .weights
-                    .iter()
-                    .zip(&pulse)
-                    .map(|(h, f)| h * f)
-                    .collect(),
-            );
+            tapered.push(scaled(&taper.weights, &pulse));
         }
-        let weight = |m: usize| {
+        let mut weights = Vec::with_capacity(lags);
+        for m in 0..lags {
             let terms = self.tapers.iter().zip(&tapered);
-            terms
-                .map(|(taper, g)| taper.factor * dot(&g[m..], &g[..lags - m]))
-                .sum()
-        };
-        (0..lags).map(weight).collect()
+            let terms = terms.map(|(taper, g)| taper.factor * dot(&g[m..], &g[..lags - m]));
+            weights.push(terms.sum());
+        }
+        weights
     }
 }
 
@@ -304,21 +298,36 @@ impl Prepared<'_> {
                 phasors,
             )
         });
-        let state = || (Scratch::new(), vec![0.0; self.numbers]);
-        let rows = map_indexed(lines, state, |(scratch, mean), line| {
-            let one = |gate: usize| {
-                mean.copy_from_slice(&self.response.noise);
-                for &(other, share) in &self.regions[[line, gate]] {
-                    let lags = &correlograms[other][gate * self.numbers..][..self.numbers];
-                    mean.iter_mut()
-                        .zip(lags)
-                        .for_each(|(sum, lag)| *sum += share * lag);
+        let rows = map_indexed(
+            lines,
+            || (Scratch::new(), vec![0.0; self.numbers]),
+            |(scratch, mean), line| {
+                let mut row = Vec::with_capacity(gates);
+                for gate in 0..gates {
+                    self.accumulate(&correlograms, [line, gate], mean);
+                    row.push(self.response.estimator.estimate(mean, scratch).velocity_m_s);
                 }
-                self.response.estimator.estimate(mean, scratch).velocity_m_s
-            };
-            (0..gates).map(one).collect::<Vec<f64>>()
-        });
+                row
+            },
+        );
         Array2::from_shape_fn((lines, gates), |(line, gate)| rows[line][gate])
+    }
+
+    /// The map of a list of parameters.
+    pub(crate) fn velocities_of(&self, p: &[f64]) -> Array2<f64> {
+        let (model, wake) = self.model.with(p);
+        self.velocities(&model, &wake)
+    }
+
+    /// Mean correlogram of the region of a place \[line, gate\], with noise, from the correlograms of the lines.
+    fn accumulate(&self, correlograms: &[Vec<f64>], place: [usize; 2], mean: &mut [f64]) {
+        mean.copy_from_slice(&self.response.noise);
+        for &(other, share) in &self.regions[place] {
+            let lags = &correlograms[other][place[1] * self.numbers..][..self.numbers];
+            mean.iter_mut()
+                .zip(lags)
+                .for_each(|(sum, lag)| *sum += share * lag);
+        }
     }
 
     /// Variance of the velocities \[m^2/s^2\] of the air that each place of the map sees.
@@ -332,19 +341,20 @@ impl Prepared<'_> {
                 (self.model, &wakes[line]),
                 Ray::new(self.elevation_rad[line]),
             );
-            let one = |range_m: &f64| {
+            let mut moments: Vec<[f64; 2]> = Vec::with_capacity(gates);
+            for range_m in self.range_m {
                 let (index, part) = self.kernel.place(range_m - nearest_m);
                 let index = index + usize::from(part >= 0.5);
-                let seen = self
-                    .weights
-                    .iter()
-                    .step_by(self.numbers)
-                    .zip(&velocities[index..]);
-                seen.fold([0.0, 0.0], |[mean, square], (w, v)| {
-                    [mean + w * v, square + w * v * v]
-                })
-            };
-            self.range_m.iter().map(one).collect::<Vec<[f64; 2]>>()
+                let weights = self.weights.iter().step_by(self.numbers);
+                let mut mean = 0.0;
+                let mut square = 0.0;
+                for (w, v) in weights.zip(&velocities[index..]) {
+                    mean += w * v;
+                    square += w * v * v;
+                }
+                moments.push([mean, square]);
+            }
+            moments
         });
         Array2::from_shape_fn((lines, gates), |(line, gate)| {
             let [mean, square] = self.regions[[line, gate]].iter().fold(
@@ -375,10 +385,10 @@ impl Prepared<'_> {
     fn line(&self, air: (&WakeModel, &Wake), ray: Ray, phasors: &mut Vec<f64>) -> Vec<f64> {
         let sampling = &self.response.sampling;
         let nearest_m = self.range_m.first().copied().unwrap_or(0.0);
-        let turn = |velocity: f64| {
-            (TAU * (sampling.frequency_hz(velocity) * sampling.period_s())).sin_cos()
-        };
-        let turns: Vec<(f64, f64)> = self.velocities_on(air, ray).into_iter().map(turn).collect();
+        let velocities = self.velocities_on(air, ray).into_iter();
+        let turns: Vec<(f64, f64)> = velocities
+            .map(|v| (TAU * (sampling.frequency_hz(v) * sampling.period_s())).sin_cos())
+            .collect();
         phasors.resize(turns.len() * self.numbers, 0.0);
         fill_powers(phasors, &turns, self.response.kind);
         let mut lags = vec![0.0; self.range_m.len() * self.numbers];

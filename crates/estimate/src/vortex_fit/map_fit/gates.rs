@@ -46,6 +46,49 @@ impl<'a> Gates<'a> {
     pub(crate) fn velocities(&self, wake: &Wake) -> Array2<f64> {
         self.predict(&wake.to_array(), &[]).velocity_m_s
     }
+
+    /// The velocity and its slopes by the free numbers of the wake at each gate of a line, gate by gate; with a motion, the wake is
+    /// given for the time `motion.1` \[s\] before that of the line.
+    fn line_numbers(
+        &self,
+        (model, wake): (&WakeModel, &Wake),
+        motion: Option<(&Motion, f64)>,
+        elevation_rad: f64,
+        groups: &[Vec<usize>],
+        scratch: &mut LineScratch,
+    ) -> Vec<f64> {
+        let wake_then = motion.map_or(*wake, |(motion, seconds)| motion.wake_after(wake, seconds));
+        let seen = (model, &wake_then, Ray::new(elevation_rad));
+        let width = groups.len() + 1;
+        let mut numbers = vec![0.0; width * self.range_m.len()];
+        let together = if self.shared_points {
+            self.range_m.len().max(1)
+        } else {
+            1
+        };
+        let parts = self.range_m.chunks(together);
+        for (range_m, numbers) in parts.zip(numbers.chunks_mut(together * width)) {
+            let has_slopes = !groups.is_empty();
+            self.kernel.apply(
+                seen,
+                range_m,
+                has_slopes,
+                scratch,
+                |gate, velocity, slope| {
+                    let (first, slopes) = numbers[width * gate..][..width].split_at_mut(1);
+                    first[0] = velocity;
+                    if has_slopes {
+                        let mut slope = *slope;
+                        if let Some((motion, seconds)) = motion {
+                            motion.carry_back(seconds, &mut slope);
+                        }
+                        gathered(groups, &slope, slopes);
+                    }
+                },
+            );
+        }
+        numbers
+    }
 }
 
 impl Prediction for Gates<'_> {
@@ -78,45 +121,18 @@ impl Prediction for Gates<'_> {
             self.elevation_rad.len(),
             LineScratch::default,
             |scratch, line| {
-                let ray = Ray::new(self.elevation_rad[line]);
-                let moving = moving
+                let motion = moving
                     .as_ref()
                     .map(|(motion, seconds)| (motion, seconds[line]));
-                let now =
-                    moving.map_or(wake, |(motion, seconds)| motion.wake_after(&wake, seconds));
-                let mut numbers = vec![0.0; width * self.range_m.len()];
-                let mut take = |gate: usize, velocity: f64, slope: &[f64; PARAMETERS]| {
-                    let (first, slopes) = numbers[width * gate..][..width].split_at_mut(1);
-                    first[0] = velocity;
-                    if !own.is_empty() {
-                        let mut slope = *slope;
-                        if let Some((motion, seconds)) = moving {
-                            motion.carry_back(seconds, &mut slope);
-                        }
-                        gathered(own, &slope, slopes);
-                    }
-                };
-                let seen = (&model, &now, ray);
-                let together = if self.shared_points {
-                    self.range_m.len().max(1)
-                } else {
-                    1
-                };
-                for (part, range_m) in self.range_m.chunks(together).enumerate() {
-                    let first = part * together;
-                    self.kernel
-                        .apply(seen, range_m, !own.is_empty(), scratch, |gate, v, s| {
-                            take(first + gate, v, s)
-                        });
-                }
-                numbers
+                let elevation_rad = self.elevation_rad[line];
+                self.line_numbers((&model, &wake), motion, elevation_rad, own, scratch)
             },
         );
         let size = (self.elevation_rad.len(), self.range_m.len());
-        let column =
-            |i: usize| Array2::from_shape_fn(size, |(line, gate)| lines[line][width * gate + i]);
-        let velocity_m_s = column(0);
-        let mut slopes: Vec<Array2<f64>> = (1..width).map(column).collect();
+        let velocity_m_s = column(&lines, size, width, 0);
+        let mut slopes: Vec<Array2<f64>> = (1..width)
+            .map(|index| column(&lines, size, width, index))
+            .collect();
         slopes.extend(quotients(
             |p| self.predict(p, &[]).velocity_m_s,
             p,
@@ -128,4 +144,9 @@ impl Prediction for Gates<'_> {
             slopes,
         }
     }
+}
+
+/// One of the `width` numbers that lines have for each gate, as a map of that size.
+fn column(lines: &[Vec<f64>], size: (usize, usize), width: usize, index: usize) -> Array2<f64> {
+    Array2::from_shape_fn(size, |(line, gate)| lines[line][width * gate + index])
 }

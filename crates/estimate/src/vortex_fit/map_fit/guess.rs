@@ -29,16 +29,6 @@ const APART_M: f64 = 12.0;
 /// Velocities that a search needs.
 const NEEDED: usize = 100;
 
-/// A pair of places with the circulations that fit best there.
-#[derive(Debug, Clone, Copy)]
-struct Pair {
-    /// Sum of squares that it explains.
-    explained: f64,
-    left: usize,
-    right: usize,
-    strength: (f64, f64),
-}
-
 /// The thinned map and what vortices on a grid of places show of it, both without the part that a wind explains.
 pub(crate) struct Search {
     /// Lateral coordinate and height of each place \[m\].
@@ -97,70 +87,70 @@ impl Search {
     /// Wakes of the best pairs with different places, the best first.
     pub(crate) fn wakes(&self) -> Vec<Wake> {
         let mut pairs = self.pairs();
-        pairs.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-        let is_near = |a: &Vortex, b: &Vortex| a.away_m(b.place_m()) < APART_M;
-        let is_same = |a: &Wake, b: &Wake| is_near(&a.left, &b.left) && is_near(&a.right, &b.right);
-        let mut wakes = distinct(pairs.iter().map(|pair| self.wake(pair)), is_same);
+        pairs.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let mut wakes = distinct(pairs.into_iter().map(|(_, wake)| wake), |a, b| {
+            a.left.away_m(b.left.place_m()) < APART_M && a.right.away_m(b.right.place_m()) < APART_M
+        });
         wakes.truncate(PAIRS);
         wakes
     }
 
-    /// The wake of a pair, without wind.
-    fn wake(&self, pair: &Pair) -> Wake {
-        let left = self.places_m[pair.left];
-        let right = self.places_m[pair.right];
-        let core_m = CORE_OVER_SPACING * (right.0 - left.0);
-        Wake::calm(
-            Vortex::at(left, pair.strength.0, core_m),
-            Vortex::at(right, pair.strength.1, core_m),
-        )
+    /// For each place of a left vortex the best pair with positive circulations, and the sum of squares that it explains.
+    fn pairs(&self) -> Vec<(f64, Wake)> {
+        let mut pairs = Vec::new();
+        for (left, left_m) in self.places_m.iter().enumerate() {
+            let mut best: Option<(f64, Wake)> = None;
+            for (right, right_m) in self.places_m.iter().enumerate() {
+                if right_m.0 - left_m.0 >= CLOSEST_M
+                    && let Some((explained, wake)) = self.pair(left, right)
+                    // the first of equals
+                    && best.is_none_or(|(most, _)| explained > most)
+                {
+                    best = Some((explained, wake));
+                }
+            }
+            pairs.extend(best);
+        }
+        pairs
     }
 
-    /// For each place of a left vortex the best one of a right vortex with positive circulations of both.
-    fn pairs(&self) -> Vec<Pair> {
-        let best = |left: usize| {
-            // a clockwise vortex shows the opposite shape
-            let a = -self.towards[left];
-            let aa = self.gram[[left, left]];
-            let pair = |right: usize| {
-                let b = self.towards[right];
-                let bb = self.gram[[right, right]];
-                let ab = -self.gram[[left, right]];
-                let determinant = aa * bb - ab * ab;
-                let strength = (
-                    (a * bb - b * ab) / determinant,
-                    (b * aa - a * ab) / determinant,
-                );
-                let possible = strength.0 > 0.0 && strength.1 > 0.0 && determinant > 1e-6 * aa * bb;
-                possible.then_some(Pair {
-                    explained: strength.0 * a + strength.1 * b,
-                    left,
-                    right,
-                    strength,
-                })
-            };
-            let apart =
-                |right: &usize| self.places_m[*right].0 - self.places_m[left].0 >= CLOSEST_M;
-            let pairs = (0..self.places_m.len()).filter(apart).filter_map(pair);
-            // the first of equals
-            pairs.reduce(|most, next| {
-                if next.explained > most.explained {
-                    next
-                } else {
-                    most
-                }
-            })
-        };
-        (0..self.places_m.len()).filter_map(best).collect()
+    /// The sum of squares that a pair at two places explains with the best circulations, and this pair without wind; nothing unless
+    /// both circulations are positive.
+    fn pair(&self, left: usize, right: usize) -> Option<(f64, Wake)> {
+        // a clockwise vortex shows the opposite shape
+        let a = -self.towards[left];
+        let b = self.towards[right];
+        let aa = self.gram[[left, left]];
+        let bb = self.gram[[right, right]];
+        let ab = -self.gram[[left, right]];
+        let determinant = aa * bb - ab * ab;
+        let left_m2_s = (a * bb - b * ab) / determinant;
+        let right_m2_s = (b * aa - a * ab) / determinant;
+        let is_possible = left_m2_s > 0.0 && right_m2_s > 0.0 && determinant > 1e-6 * aa * bb;
+        if !is_possible {
+            return None;
+        }
+        let left_m = self.places_m[left];
+        let right_m = self.places_m[right];
+        let core_m = CORE_OVER_SPACING * (right_m.0 - left_m.0);
+        let pair = Wake::calm(
+            Vortex::at(left_m, left_m2_s, core_m),
+            Vortex::at(right_m, right_m2_s, core_m),
+        );
+        Some((left_m2_s * a + right_m2_s * b, pair))
     }
 
     /// The best place of one vortex of that sense of turning (-1 left, +1 right) alone, and its circulation.
     pub(crate) fn single(&self, sense: f64) -> Option<((f64, f64), f64)> {
-        let explained = |place: usize| {
-            (sense * self.towards[place]).max(0.0).powi(2) / self.gram[[place, place]]
-        };
-        let best = (0..self.places_m.len())
-            .reduce(|a, b| if explained(b) > explained(a) { b } else { a })?;
+        let mut best: Option<(usize, f64)> = None;
+        for place in 0..self.places_m.len() {
+            let explained =
+                (sense * self.towards[place]).max(0.0).powi(2) / self.gram[[place, place]];
+            if best.is_none_or(|(_, most)| explained > most) {
+                best = Some((place, explained));
+            }
+        }
+        let (best, _) = best?;
         let strength = sense * self.towards[best] / self.gram[[best, best]];
         (strength > 0.0).then_some((self.places_m[best], strength))
     }
@@ -171,13 +161,13 @@ impl Search {
 fn places(map: &VelocityMap<'_>, model: &WakeModel) -> (Vec<(f64, f64)>, f64) {
     let (first_rad, last_rad) = ends(map.elevation_rad);
     let (near_m, far_m) = ends(map.range_m);
-    let middle =
-        |from: f64, to: f64, i: usize| from + (to - from) * (i as f64 + 0.5) / PLACES as f64;
     let mut places_m = Vec::new();
     for i in 0..PLACES {
+        let range_m = near_m + (far_m - near_m) * (i as f64 + 0.5) / PLACES as f64;
         for j in 0..PLACES {
-            let place_m =
-                model.position_m(middle(near_m, far_m, i), middle(first_rad, last_rad, j));
+            let elevation_rad =
+                first_rad + (last_rad - first_rad) * (j as f64 + 0.5) / PLACES as f64;
+            let place_m = model.position_m(range_m, elevation_rad);
             if !model.images || place_m.1 > 0.0 {
                 places_m.push(place_m);
             }

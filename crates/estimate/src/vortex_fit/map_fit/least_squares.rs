@@ -64,23 +64,10 @@ impl LeastSquares<'_> {
     pub(crate) fn rows(&self, p: &[f64], groups: &[Vec<usize>]) -> Rows {
         let predicted = self.prediction.predict(p, groups);
         let columns = map_each(predicted.slopes.len() + 1, |column| {
-            let number = |cell: &Cell| {
-                let place = [cell.line, cell.gate];
-                let number = match column.checked_sub(1) {
-                    Some(slope) => predicted.slopes[slope][place],
-                    None => {
-                        let away = cell.velocity_m_s - predicted.velocity_m_s[place];
-                        self.fold_m_s
-                            .map_or(away, |fold| away - fold * (away / fold).round())
-                    }
-                };
-                if self.whitening.is_some() {
-                    number
-                } else {
-                    number / cell.sigma_m_s
-                }
+            let mut numbers: Vec<f64> = match column.checked_sub(1) {
+                Some(slope) => self.slopes_at_cells(&predicted.slopes[slope]),
+                None => self.differences_from(&predicted.velocity_m_s),
             };
-            let mut numbers: Vec<f64> = self.cells.iter().map(number).collect();
             if let Some(whitening) = &self.whitening {
                 whitening.whiten(&mut numbers);
             }
@@ -90,6 +77,36 @@ impl LeastSquares<'_> {
         Rows {
             residuals: columns.next().unwrap_or_default(),
             slopes: columns.collect(),
+        }
+    }
+
+    /// Slopes at the cells, over the deviations unless they are made white afterwards.
+    fn slopes_at_cells(&self, slopes: &Array2<f64>) -> Vec<f64> {
+        self.cells
+            .iter()
+            .map(|cell| slopes[[cell.line, cell.gate]] / self.divisor(cell))
+            .collect()
+    }
+
+    /// Measured less predicted velocities, modulo the width after which they repeat, over the deviations unless they are made white
+    /// afterwards.
+    fn differences_from(&self, predicted_m_s: &Array2<f64>) -> Vec<f64> {
+        let mut differences = Vec::with_capacity(self.cells.len());
+        for cell in &self.cells {
+            let mut difference = cell.velocity_m_s - predicted_m_s[[cell.line, cell.gate]];
+            if let Some(fold) = self.fold_m_s {
+                difference -= fold * (difference / fold).round();
+            }
+            differences.push(difference / self.divisor(cell));
+        }
+        differences
+    }
+
+    fn divisor(&self, cell: &Cell) -> f64 {
+        if self.whitening.is_some() {
+            1.0
+        } else {
+            cell.sigma_m_s
         }
     }
 
@@ -254,9 +271,8 @@ impl LeastSquares<'_> {
         known
             .iter()
             .for_each(|(_, slope)| add_square(&mut of_known, slope, self.counted));
-        let curvature = |weights: &[f64]| products(weights, &rows.slopes) + &of_known;
         if matches!(from, Scores::Stated) {
-            let curvature = curvature(&vec![1.0; weights.len()]);
+            let curvature = products(&vec![1.0; weights.len()], &rows.slopes) + &of_known;
             let scores = &curvature * inflation(self.loss);
             return Ok(Uncertainty {
                 groups,
@@ -266,9 +282,9 @@ impl LeastSquares<'_> {
             });
         }
         // with many outliers the second derivatives need not be positive: their weights are, and are larger
-        let mut a = curvature(&curved);
+        let mut a = products(&curved, &rows.slopes) + &of_known;
         if inverse(CURVATURE, &a).is_err() {
-            a = curvature(&weights);
+            a = products(&weights, &rows.slopes) + &of_known;
         }
         let weighted = scaled(&weights, &rows.residuals);
         let all = Cells {
@@ -310,11 +326,16 @@ impl Uncertainty<'_> {
         let free: Vec<usize> = (0..self.groups.len())
             .filter(|i| wanted(&self.groups[*i]))
             .collect();
-        let of = |all: &Array2<f64>| all.select(Axis(0), &free).select(Axis(1), &free);
-        let bread = inverse(CURVATURE, &of(&self.curvature))?;
+        let bread = inverse(CURVATURE, &submatrix(&self.curvature, &free))?;
+        let scores = submatrix(&self.scores, &free);
         let groups: Vec<Vec<usize>> = free.iter().map(|i| self.groups[*i].clone()).collect();
-        Ok(spread(&groups, &bread.dot(&of(&self.scores)).dot(&bread)))
+        Ok(spread(&groups, &bread.dot(&scores).dot(&bread)))
     }
+}
+
+/// Rows and columns of a matrix with those indices.
+pub(crate) fn submatrix(matrix: &Array2<f64>, indices: &[usize]) -> Array2<f64> {
+    matrix.select(Axis(0), indices).select(Axis(1), indices)
 }
 
 /// Variance of a fit with that loss over that of least squares, for normal residuals.

@@ -46,11 +46,13 @@ pub(crate) fn quotients(
     here: &Array2<f64>,
     groups: &[Vec<usize>],
 ) -> Vec<Array2<f64>> {
-    let quotient = |group: &Vec<usize>| {
+    let mut quotients = Vec::with_capacity(groups.len());
+    for group in groups {
         let step = step(p, group[0]);
-        (velocities(&stepped(std::slice::from_ref(group), p, &[step])) - here) / step
-    };
-    groups.iter().map(quotient).collect()
+        let stepped = stepped(std::slice::from_ref(group), p, &[step]);
+        quotients.push((velocities(&stepped) - here) / step);
+    }
+    quotients
 }
 
 /// Slopes about one list of parameters serve for another while no parameter is more than so many steps, each a third of an error, away.
@@ -104,11 +106,12 @@ pub(crate) struct Tangent {
 impl Tangent {
     /// The part of the way to other parameters that the slopes can speak for.
     pub(crate) fn reach(&self, to: &[f64]) -> f64 {
-        let part = |place: usize| {
-            REACH * step(&self.at, place)
-                / (to[place] - self.at[place]).abs().max(f64::MIN_POSITIVE)
-        };
-        (0..to.len()).map(part).fold(1.0, f64::min)
+        let mut reach = 1.0_f64;
+        for (place, (to, at)) in to.iter().zip(&self.at).enumerate() {
+            let away = (to - at).abs().max(f64::MIN_POSITIVE);
+            reach = reach.min(REACH * step(&self.at, place) / away);
+        }
+        reach
     }
 }
 

@@ -29,7 +29,7 @@ use std::sync::Arc;
 
 use crate::linalg::dot;
 use crate::spectrum::transform::complex_transforms;
-use crate::vortex_fit::map_fit::cells::{Cell, orthonormal, products};
+use crate::vortex_fit::map_fit::cells::{Cell, orthonormal, products, scaled};
 
 /// Cells with their weighted residuals and, by free number, slopes, over the same deviations.
 #[derive(Clone, Copy)]
@@ -49,16 +49,21 @@ const FINE: f64 = 1.15;
 
 /// The least length from `least` on without prime factors but 2, 3 and 5, whose transforms are quick.
 fn fast_length(least: usize) -> usize {
-    let is_fast = |length: &usize| {
-        let mut rest = *length;
-        for factor in [2, 3, 5] {
-            while rest.is_multiple_of(factor) {
-                rest /= factor;
-            }
+    let mut length = least.max(1);
+    while !is_fast_length(length) {
+        length += 1;
+    }
+    length
+}
+
+fn is_fast_length(length: usize) -> bool {
+    let mut rest = length;
+    for factor in [2, 3, 5] {
+        while rest.is_multiple_of(factor) {
+            rest /= factor;
         }
-        rest == 1
-    };
-    (least.max(1)..).find(is_fast).unwrap_or(least)
+    }
+    rest == 1
 }
 
 /// Sums over all pairs of cells that are so far apart, by Fourier transforms on a grid with at least as much room again.
@@ -75,8 +80,9 @@ struct Plane<'a> {
 
 impl<'a> Plane<'a> {
     fn new(cells: &'a [Cell]) -> Self {
-        let most = |of: fn(&Cell) -> usize| cells.iter().map(of).max().unwrap_or(0) + 1;
-        let extent = (most(|cell| cell.line), most(|cell| cell.gate));
+        let last_line = cells.iter().map(|cell| cell.line).max().unwrap_or(0);
+        let last_gate = cells.iter().map(|cell| cell.gate).max().unwrap_or(0);
+        let extent = (last_line + 1, last_gate + 1);
         let lines = fast_length(2 * extent.0);
         let gates = fast_length(2 * extent.1);
         Self {
@@ -134,22 +140,29 @@ impl<'a> Plane<'a> {
 
     /// Sum of a function of the distance over all distances of cells, with either sign.
     fn sum(&self, function: &[f64]) -> f64 {
-        let is_within = |i: usize, extent: usize, size: usize| i <= extent || i > size - extent;
-        let rows = function.chunks_exact(self.gates).enumerate();
-        let rows = rows.filter(|(line, _)| is_within(*line, self.extent.0, self.lines));
-        let near = rows.flat_map(|(_, row)| row.iter().enumerate());
-        near.filter(|(gate, _)| is_within(*gate, self.extent.1, self.gates))
-            .map(|(_, value)| value)
-            .sum()
+        let mut sum = 0.0;
+        for (line, row) in function.chunks_exact(self.gates).enumerate() {
+            for (gate, value) in row.iter().enumerate() {
+                let is_within = is_distance(line, self.extent.0, self.lines)
+                    && is_distance(gate, self.extent.1, self.gates);
+                if is_within {
+                    sum += value;
+                }
+            }
+        }
+        sum
     }
 
     /// A function of the distances (lines, gates) on the grid.
     fn of_distance<T>(&self, f: impl Fn(f64, f64) -> T) -> Vec<T> {
-        let short = |i: usize, of: usize| i.min(of - i) as f64;
-        let places = (0..self.lines).flat_map(|i| (0..self.gates).map(move |j| (i, j)));
-        places
-            .map(|(i, j)| f(short(i, self.lines), short(j, self.gates)))
-            .collect()
+        let mut values = Vec::with_capacity(self.lines * self.gates);
+        for line in 0..self.lines {
+            let lines = line.min(self.lines - line) as f64;
+            for gate in 0..self.gates {
+                values.push(f(lines, gate.min(self.gates - gate) as f64));
+            }
+        }
+        values
     }
 
     /// Sums of products of the numbers of all pairs of cells, by distance.
@@ -197,6 +210,11 @@ impl<'a> Plane<'a> {
     }
 }
 
+/// Whether an index of a periodic axis of the grid is a distance of two cells, with either sign.
+fn is_distance(index: usize, extent: usize, size: usize) -> bool {
+    index <= extent || index > size - extent
+}
+
 /// Correlation at those lengths.
 fn exponential(plane: &Plane<'_>, (lines, gates): (f64, f64)) -> Vec<f64> {
     plane.of_distance(|i, j| (-(i / lines).hypot(j / gates)).exp())
@@ -210,6 +228,13 @@ struct Fitted {
     lengths: (f64, f64),
     /// Sum of squares of what is left of the correlogram.
     left: f64,
+}
+
+impl Fitted {
+    /// The one that leaves less, the first of equals.
+    fn or_better(self, other: Self) -> Self {
+        if other.left < self.left { other } else { self }
+    }
 }
 
 /// Correlogram of the residuals and what is needed to say what is expected of it.
@@ -288,22 +313,16 @@ impl<'a> Correlogram<'a> {
                 *taken += 2.0 * (a.conj() * b).re;
             }
         }
-        let taken = plane.back(taken);
-        correlation
-            .iter()
-            .zip(&self.pairs)
-            .zip(taken)
-            .map(|((c, pairs), taken)| c * pairs - taken)
-            .collect()
+        let mut expected = scaled(correlation, &self.pairs);
+        for (expected, taken) in expected.iter_mut().zip(plane.back(taken)) {
+            *expected -= taken;
+        }
+        expected
     }
 
     fn product(&self, a: &[f64], b: &[f64]) -> f64 {
-        self.weights
-            .iter()
-            .zip(a)
-            .zip(b)
-            .map(|((w, a), b)| w * a * b)
-            .sum()
+        let factors = self.weights.iter().zip(a).zip(b);
+        factors.map(|((w, a), b)| w * a * b).sum()
     }
 
     /// White noise alone.
@@ -357,13 +376,12 @@ impl<'a> Correlogram<'a> {
     fn fit(&self) -> Fitted {
         let alone = self.white_alone();
         let longest = self.plane.half();
-        let better = |a: Fitted, b: Fitted| if b.left < a.left { b } else { a };
         let parts = (0..)
             .map(|i| COARSE.powi(-i))
             .take_while(|part| longest.0.max(longest.1) * part > 0.4);
         let best = parts
             .map(|part| self.at((longest.0 * part, longest.1 * part)))
-            .fold(alone, better);
+            .fold(alone, Fitted::or_better);
         // distances come twice, one for each sign
         if alone.left - best.left < 2.0 * BEYOND_CHANCE * alone.white * alone.white {
             return alone;
@@ -381,7 +399,7 @@ impl<'a> Correlogram<'a> {
             let next = tried
                 .map(|lengths| self.at(lengths))
                 .into_iter()
-                .fold(best, better);
+                .fold(best, Fitted::or_better);
             if next.left >= best.left {
                 ratio = ratio.sqrt();
             }
@@ -436,24 +454,18 @@ fn neighbours(plane: &Plane<'_>, residuals: &[f64], lines: usize) -> Option<Vec<
     if variance <= 0.0 || !variance.is_finite() {
         return None;
     }
-    let last = |most: usize, of: &dyn Fn(usize) -> f64| {
-        (1..=most)
-            .find(|k| of(*k) < LEAST * variance)
-            .map_or(most, |k| k - 1)
-    };
-    let last_line = last(lines.min(plane.extent.0 / 3), &|line| {
-        means[line * plane.gates]
-    }) as f64;
-    let last_gate = last(plane.extent.1 / 3, &|gate| means[gate]) as f64;
+    let across = (1..=lines.min(plane.extent.0 / 3)).map(|line| means[line * plane.gates]);
+    let along = (1..=plane.extent.1 / 3).map(|gate| means[gate]);
+    let last_line = across.take_while(|mean| *mean >= LEAST * variance).count() as f64;
+    let last_gate = along.take_while(|mean| *mean >= LEAST * variance).count() as f64;
     let near = plane.of_distance(|line, gate| line <= last_line && gate <= last_gate);
-    let correlation =
-        |(mean, near): (&f64, bool)| (mean / variance, near && (mean / variance).abs() >= LEAST);
-    let correlations = means.iter().zip(near).map(correlation);
-    Some(
-        correlations
-            .map(|(correlation, counts)| if counts { correlation } else { 0.0 })
-            .collect(),
-    )
+    let mut correlations = Vec::with_capacity(means.len());
+    for (mean, is_near) in means.iter().zip(near) {
+        let correlation = mean / variance;
+        let counts = is_near && correlation.abs() >= LEAST;
+        correlations.push(if counts { correlation } else { 0.0 });
+    }
+    Some(correlations)
 }
 
 /// B, and the number of cells that count as one. Residuals and slopes are summed over blocks of so many lines and gates, over the root of their
@@ -475,15 +487,11 @@ pub(crate) fn decaying(all: Cells<'_>, (lines, gates): (usize, usize)) -> (Array
             sigma_m_s: 1.0,
         })
         .collect();
-    let summed = |numbers: &[f64]| -> Vec<f64> {
-        places
-            .values()
-            .map(|own| own.iter().map(|i| numbers[*i]).sum::<f64>() / (own.len() as f64).sqrt())
-            .collect()
-    };
-    let slopes: Vec<Vec<f64>> = all.slopes.iter().map(|slope| summed(slope)).collect();
+    let slopes = all.slopes.iter().map(|slope| block_sums(&places, slope));
+    let slopes: Vec<Vec<f64>> = slopes.collect();
     let plane = Plane::new(&blocks);
-    let found = Correlogram::new(&plane, &summed(all.residuals), &slopes).fit();
+    let residuals = block_sums(&places, all.residuals);
+    let found = Correlogram::new(&plane, &residuals, &slopes).fit();
     let white = products(&vec![found.white; all.cells.len()], all.slopes);
     if found.correlated == 0.0 {
         return (white, 1.0);
@@ -495,6 +503,16 @@ pub(crate) fn decaying(all: Cells<'_>, (lines, gates): (usize, usize)) -> (Array
         white + plane.quadratic(&slopes, &correlation) * found.correlated,
         alike,
     )
+}
+
+/// Sums of numbers over the cells of each block, over the root of their count.
+fn block_sums(blocks: &BTreeMap<(usize, usize), Vec<usize>>, numbers: &[f64]) -> Vec<f64> {
+    let mut sums = Vec::with_capacity(blocks.len());
+    for cells in blocks.values() {
+        let sum: f64 = cells.iter().map(|i| numbers[*i]).sum();
+        sums.push(sum / (cells.len() as f64).sqrt());
+    }
+    sums
 }
 
 #[cfg(test)]

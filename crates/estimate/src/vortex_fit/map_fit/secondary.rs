@@ -7,7 +7,6 @@
 //! and how wide. Check: exact maps with four vortices, and with two; simulated wakes.
 
 use ndarray::{Array1, Array2};
-use std::ops::Range;
 
 use crate::linalg::positive_definite::inverse;
 use crate::vortex_fit::map_fit::cells::{products, scaled};
@@ -69,42 +68,46 @@ fn is_near(distance: f64) -> bool {
     (DISTANCES.0..=DISTANCES.1).contains(&distance)
 }
 
+/// Every `step`th place of the grid in a square about one of them.
+fn grid(centre: (i64, i64), reach: i64, step: usize) -> impl Iterator<Item = (i64, i64)> {
+    let rows = (centre.0 - reach..=centre.0 + reach).step_by(step);
+    let columns = (centre.1 - reach..=centre.1 + reach).step_by(step);
+    rows.flat_map(move |i| columns.clone().map(move |j| (i, j)))
+}
+
 impl Setting<'_, '_> {
     /// The best wake with secondary vortices, if the map shows any or they are fitted anyway, and the fit of all comes to an end. Without a ground
     /// there are none.
     pub(crate) fn with_secondary(&self, pair: &Wake) -> Option<Found> {
-        let possible = |vortex: &Vortex| vortex.circulation_m2_s > 0.0 && vortex.height_m > 0.0;
-        if !self.model.images || !possible(&pair.left) || !possible(&pair.right) {
+        let vortices = [pair.left, pair.right];
+        let are_above_ground = vortices
+            .iter()
+            .all(|vortex| vortex.circulation_m2_s > 0.0 && vortex.height_m > 0.0);
+        if !self.model.images || !are_above_ground {
             return None;
         }
         let always = self.options.secondary == Secondary::Always;
         // what is not understood of one vortex in view may be its partner beyond the scan
-        let are_seen = self.sees(&pair.left) && self.sees(&pair.right);
-        if !are_seen && !always {
+        if !always && !vortices.iter().all(|vortex| self.sees(vortex)) {
             return None;
         }
         let lines = self.options.correlated_lines;
         let mut groups = self.options.free.groups();
-        let two = pair.to_array().to_vec();
-        let alone = self.linear(&two, &groups, None).ok()?;
-        let counted = self.about(&alone).alike(&two, lines);
+        let mut start = pair.to_array().to_vec();
+        let alone = self.linear(&start, &groups, None).ok()?;
+        let counted = self.about(&alone).alike(&start, lines);
         let (secondary, gain, of_profile) = self.search(pair, &alone)?;
         if gain < LEAST_GAIN.max(counted) && !always {
             return None;
         }
-        let numbers = |v: &Vortex| {
-            [
-                v.circulation_m2_s,
-                v.lateral_position_m,
-                v.height_m,
+        for vortex in secondary {
+            start.extend([
+                vortex.circulation_m2_s,
+                vortex.lateral_position_m,
+                vortex.height_m,
                 KNOWN_CORE.0.ln(),
-            ]
-        };
-        let start: Vec<f64> = two
-            .iter()
-            .copied()
-            .chain(secondary.iter().flat_map(numbers))
-            .collect();
+            ]);
+        }
         groups.extend((PARAMETERS..PARAMETERS + NUMBERS).map(|place| vec![place]));
         let mut settled = self
             .settled(start, &groups, SECONDARY, Some(counted))
@@ -114,22 +117,30 @@ impl Setting<'_, '_> {
             .about(&settled)
             .alike(&settled.tangent.at, lines)
             .min(counted);
-        let p = &settled.tangent.at;
         let gain = self.gain(&settled, &alone) - of_profile / settled.counted;
+        self.found(&settled, gain)
+    }
+
+    /// What is reported of a fit of four vortices that gains so much of the logarithm of the likelihood; nothing if the map does not show the
+    /// secondary ones and they are not requested.
+    fn found(&self, settled: &Linear, gain: f64) -> Option<Found> {
+        let p = &settled.tangent.at;
         // one far from its vortex stands for something else; a little beyond the scan it may be
-        let stands =
-            |(ratio, distance): (f64, f64)| (RATIOS.0..0.0).contains(&ratio) && is_near(distance);
-        let shown = gain >= LEAST_GAIN && secondary_ratios(p).into_iter().all(stands);
+        let are_near = secondary_ratios(p)
+            .into_iter()
+            .all(|(ratio, distance)| (RATIOS.0..0.0).contains(&ratio) && is_near(distance));
+        let shown = gain >= LEAST_GAIN && are_near;
+        let always = self.options.secondary == Secondary::Always;
         let fitted = always || shown && self.options.secondary == Secondary::Auto;
         if !shown && !fitted {
             return None;
         }
         let (model, wake) = self.model.with(p);
-        let scores = Scores::OfNeighbours { lines };
-        let uncertainty = self
-            .about(&settled)
-            .uncertainty(p, &settled.groups, scores)
-            .ok()?;
+        let scores = Scores::OfNeighbours {
+            lines: self.options.correlated_lines,
+        };
+        let squares = self.about(settled);
+        let uncertainty = squares.uncertainty(p, &settled.groups, scores).ok()?;
         let secondary = SecondaryVortices {
             vortices: model.secondary?,
             shown,
@@ -189,15 +200,20 @@ impl Setting<'_, '_> {
     /// Every second place of a grid first, then those about the best of them.
     fn beside(&self, side: usize, free: &Residuals<'_>) -> Option<(Vortex, f64)> {
         let count = (DISTANCES.1 / GRID_OVER_HEIGHT).ceil() as i64;
-        let best = |rows: Range<i64>, columns: Range<i64>, step: usize| {
-            let places = rows
-                .step_by(step)
-                .flat_map(|i| columns.clone().step_by(step).map(move |j| (i, j)));
-            let gains = places.filter_map(|at| Some((at, self.at_place(side, at, free)?)));
-            gains.max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))
-        };
-        let ((i, j), _) = best(-count..count + 1, -count..count + 1, 2)?;
-        best(i - 1..i + 2, j - 1..j + 2, 1).map(|(_, found)| found)
+        let (place, _) = self.best_of(side, grid((0, 0), count, 2), free)?;
+        let (_, found) = self.best_of(side, grid(place, 1, 1), free)?;
+        Some(found)
+    }
+
+    /// The place with the vortex that gains most, the last of equals, and what it gains.
+    fn best_of(
+        &self,
+        side: usize,
+        places: impl Iterator<Item = (i64, i64)>,
+        free: &Residuals<'_>,
+    ) -> Option<((i64, i64), (Vortex, f64))> {
+        let gains = places.filter_map(|place| Some((place, self.at_place(side, place, free)?)));
+        gains.max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))
     }
 
     /// The best vortex at a place of the grid about one of the pair, and what it gains; nothing where there can be none.

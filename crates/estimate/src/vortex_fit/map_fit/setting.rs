@@ -14,7 +14,7 @@ use crate::vortex_fit::map_fit::cells::{Cell, cells};
 use crate::vortex_fit::map_fit::data::{median, robust_scale};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Scores};
-use crate::vortex_fit::map_fit::prediction::{Prediction, Tangent, near};
+use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, Tangent, near};
 use crate::vortex_fit::tolerances::{ALMOST_CONVERGED_SIGMAS, MEANS};
 use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{
@@ -52,9 +52,10 @@ pub(crate) struct Linear {
 impl Linear {
     /// Its cells at which another one has a velocity, too.
     pub(crate) fn shared_with(&self, other: &Self) -> Vec<Cell> {
-        let is_seen =
-            |cell: &&Cell| other.tangent.here.velocity_m_s[[cell.line, cell.gate]].is_finite();
-        self.cells.iter().filter(is_seen).cloned().collect()
+        let velocity_m_s = &other.tangent.here.velocity_m_s;
+        let mut cells = self.cells.clone();
+        cells.retain(|cell| velocity_m_s[[cell.line, cell.gate]].is_finite());
+        cells
     }
 }
 
@@ -105,15 +106,15 @@ impl Setting<'_, '_> {
     pub(crate) fn gain(&self, better: &Linear, than: &Linear) -> f64 {
         let cells = better.shared_with(than);
         let counted = better.counted;
-        let of = |linear: &Linear| {
+        let [of_better, of_other] = [better, than].map(|linear| {
             let squares = LeastSquares {
                 cells: cells.clone(),
                 counted,
                 ..self.about(linear)
             };
             squares.log_likelihood(&linear.tangent.at, &linear.groups)
-        };
-        (of(better) - of(than)) / counted
+        });
+        (of_better - of_other) / counted
     }
 
     /// The fit by descent from a start on.
@@ -125,16 +126,9 @@ impl Setting<'_, '_> {
             .cloned()
             .collect();
         let mut p = self.options.free.start(start).to_array().to_vec();
-        let scaled = |p: &[f64]| {
-            let squares = self.squares(self.prediction, cells(self.map));
-            let scale = squares.residual_scale(p);
-            finite("scale of the residuals", scale)?;
-            let squares = squares.rescaled(scale.max(1e-6));
-            let counted = squares.alike(p, self.options.correlated_lines);
-            Ok((LeastSquares { counted, ..squares }, scale))
-        };
+
         for round in 0..ROUNDS {
-            let (squares, _) = scaled(&p)?;
+            let (squares, _) = self.rescaled(&p)?;
             let mut end = converged(squares.minimum(&p, &groups, stop), stop);
             // a core that the map does not resolve may run away to nothing: it keeps what the last round gave
             if end.is_err() && round > 0 && coreless.len() < groups.len() {
@@ -143,8 +137,19 @@ impl Setting<'_, '_> {
             }
             p = end?.at;
         }
-        let (squares, scale) = scaled(&p)?;
+        let (squares, scale) = self.rescaled(&p)?;
         self.outcome(&squares, &p, &groups, scale)
+    }
+
+    /// Least squares with the deviations and the correlation that the residuals have at `p`, and the scale of the residuals over the stated
+    /// deviations.
+    fn rescaled(&self, p: &[f64]) -> Result<(LeastSquares<'_>, f64), Error> {
+        let squares = self.squares(self.prediction, cells(self.map));
+        let scale = squares.residual_scale(p);
+        finite("scale of the residuals", scale)?;
+        let squares = squares.rescaled(scale.max(1e-6));
+        let counted = squares.alike(p, self.options.correlated_lines);
+        Ok((LeastSquares { counted, ..squares }, scale))
     }
 
     /// The fit by steps of Gauss and Newton from a start on, with neighbours that are alike counted once.
@@ -173,29 +178,19 @@ impl Setting<'_, '_> {
         let mut turns = 0;
         let mut last = vec![0.0; p.len()];
         let mut sigmas_left = f64::INFINITY;
-        let mut known: Option<Tangent> = None;
-        let mut alike = counted.unwrap_or(1.0);
+        let mut last_linear: Option<Linear> = None;
+        let mut alike = 1.0;
         let mut steps = 0;
         let mut most = stop.iterations;
         while steps < most {
             steps += 1;
-            let serves = |known: &Tangent| {
-                near(&known.slopes_at, &p) && known.here.slopes.len() == groups.len()
-            };
-            let kept = known.take().filter(serves);
-            let is_kept = kept.is_some();
-            let mut linear = self.linear(&p, &groups, kept)?;
-            if !is_kept && counted.is_none() {
-                alike = self.about(&linear).alike(&p, self.options.correlated_lines);
-            }
-            linear.counted = alike;
+            let linear = self.next_linear(&p, &groups, last_linear.take(), counted)?;
+            alike = linear.counted;
             let squares = self.about(&linear);
-            let no_way = |sigmas_left| Error::NotConverged {
-                iterations: steps,
-                sigmas_left,
-            };
             let next = squares.reweighted(&p, &groups, MEANS)?;
-            let normal = squares.normal(&p, &groups).ok_or(no_way(sigmas_left))?;
+            let normal = squares
+                .normal(&p, &groups)
+                .ok_or(not_converged(steps, sigmas_left))?;
             let way: Vec<f64> = next.iter().zip(&p).map(|(next, p)| next - p).collect();
             let step = free_numbers(&way, &groups);
             let last_step = free_numbers(&last, &groups);
@@ -212,13 +207,12 @@ impl Setting<'_, '_> {
                 }
                 return Ok(linear);
             }
-            let there = halved(share.min(linear.tangent.reach(&next)), |part| {
-                let trial: Vec<f64> = p.iter().zip(&way).map(|(p, way)| p + part * way).collect();
-                self.prediction.allows(&trial).then_some(trial)
-            });
-            p = there.ok_or(no_way(sigmas_left))?;
+            let longest = share.min(linear.tangent.reach(&next));
+            p = self
+                .moved(&p, &way, longest)
+                .ok_or(not_converged(steps, sigmas_left))?;
             last = way;
-            known = Some(linear.tangent);
+            last_linear = Some(linear);
             keep_small_cores(&mut p, &mut groups, self.least_core_m);
         }
         if sigmas_left <= ALMOST_CONVERGED_SIGMAS {
@@ -228,9 +222,40 @@ impl Setting<'_, '_> {
                 ..linear
             });
         }
-        Err(Error::NotConverged {
-            iterations: steps,
-            sigmas_left,
+        Err(not_converged(steps, sigmas_left))
+    }
+
+    /// The model made linear about `p`, with the slopes of the last step if they serve there. How many velocities count as one is given or taken
+    /// from the residuals wherever slopes are.
+    fn next_linear(
+        &self,
+        p: &[f64],
+        groups: &[Vec<usize>],
+        last: Option<Linear>,
+        counted: Option<f64>,
+    ) -> Result<Linear, Error> {
+        let kept = last.filter(|last| {
+            let tangent = &last.tangent;
+            near(&tangent.slopes_at, p) && tangent.here.slopes.len() == groups.len()
+        });
+        let counted = counted.or(kept.as_ref().map(|kept| kept.counted));
+        let mut linear = self.linear(p, groups, kept.map(|kept| kept.tangent))?;
+        linear.counted = match counted {
+            Some(counted) => counted,
+            None => self.about(&linear).alike(p, self.options.correlated_lines),
+        };
+        Ok(linear)
+    }
+
+    /// The parameters after the largest part of a step, at most `longest`, at which the model exists.
+    fn moved(&self, p: &[f64], step: &[f64], longest: f64) -> Option<Vec<f64>> {
+        halved(longest, |part| {
+            let trial: Vec<f64> = p
+                .iter()
+                .zip(step)
+                .map(|(p, step)| p + part * step)
+                .collect();
+            self.prediction.allows(&trial).then_some(trial)
         })
     }
 
@@ -255,17 +280,14 @@ impl Setting<'_, '_> {
             here.velocity_m_s[place].is_finite()
                 && here.slopes.iter().all(|slope| slope[place].is_finite())
         });
-        let residual = |cell: &Cell| {
-            (cell.velocity_m_s - here.velocity_m_s[[cell.line, cell.gate]]) / cell.sigma_m_s
-        };
         if let Some(variances) = self.prediction.air_variances(p) {
-            let deviations = learnt_deviations(&variances, &cells, residual);
+            let deviations = learnt_deviations(&variances, &cells, |cell| residual(cell, &here));
             cells
                 .iter_mut()
                 .zip(deviations)
                 .for_each(|(cell, deviation)| cell.sigma_m_s *= deviation);
         }
-        let scale = robust_scale(cells.iter().map(residual));
+        let scale = robust_scale(cells.iter().map(|cell| residual(cell, &here)));
         finite("scale of the residuals", scale)?;
         let scale = scale.max(1e-6);
         cells.iter_mut().for_each(|cell| cell.sigma_m_s *= scale);
@@ -329,6 +351,18 @@ impl Setting<'_, '_> {
                 chi2: -2.0 * squares.log_likelihood(p, groups) / uncertainty.alike,
             }],
         })
+    }
+}
+
+/// Difference of a measured velocity from the predicted one in standard deviations.
+fn residual(cell: &Cell, predicted: &Predicted) -> f64 {
+    (cell.velocity_m_s - predicted.velocity_m_s[[cell.line, cell.gate]]) / cell.sigma_m_s
+}
+
+fn not_converged(iterations: usize, sigmas_left: f64) -> Error {
+    Error::NotConverged {
+        iterations,
+        sigmas_left,
     }
 }
 

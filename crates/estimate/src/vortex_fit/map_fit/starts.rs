@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::vortex_fit::map_fit::prediction::LONE_M;
 use crate::vortex_fit::tolerances::{COMPETES, HOPELESS_OF_ESTIMATES, ONE_SIGMAS, SAME_SIGMAS};
 use crate::vortex_fit::top::{distinct, mixed};
-use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Vortex, Wake};
+use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Wake};
 
 /// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span, 3.8 to 6.4 % of the spacing).
 pub(crate) const CORE_OVER_SPACING: f64 = CorePrior::TYPICAL.median_ratio;
@@ -22,41 +22,36 @@ const ROUNDS: usize = 3;
 /// The starts about a wake: its core radii are the one that is kept, the typical one, or that and others if they are fitted. Where one vortex is far
 /// weaker than the other, a pair of equal ones is the other start.
 pub(crate) fn starts(about: &Wake, options: &MapFitOptions) -> Vec<Wake> {
-    let cores_m = |wake: &Wake| {
-        let typical_m = CORES_OVER_SPACING.map(|over_spacing| over_spacing * wake.spacing_m());
-        match options.free.core_radius {
-            Sharing::Fixed => vec![options.core_radius_m.unwrap_or(typical_m[0])],
-            Sharing::Common | Sharing::Separate => typical_m.to_vec(),
-        }
-    };
-    let mut starts: Vec<Wake> = cores_m(about)
-        .into_iter()
-        .map(|core_m| about.with_cores(core_m))
-        .collect();
+    let mut starts = with_start_cores(about, options);
     if let Some(equal) = with_equal_partner(about) {
         starts.truncate(1);
-        starts.push(equal.with_cores(cores_m(&equal)[0]));
+        starts.extend(with_start_cores(&equal, options).first());
     }
     starts
+}
+
+/// A wake with each of the core radii that fits start with.
+fn with_start_cores(wake: &Wake, options: &MapFitOptions) -> Vec<Wake> {
+    let typical_m = CORES_OVER_SPACING.map(|over_spacing| over_spacing * wake.spacing_m());
+    match options.free.core_radius {
+        Sharing::Fixed => vec![wake.with_cores(options.core_radius_m.unwrap_or(typical_m[0]))],
+        Sharing::Common | Sharing::Separate => {
+            typical_m.map(|core_m| wake.with_cores(core_m)).to_vec()
+        }
+    }
 }
 
 /// A vortex whose partner is far weaker with one like itself in its place, as where the partner is beyond the scan and what is taken for it is not.
 fn with_equal_partner(wake: &Wake) -> Option<Wake> {
     let Wake { left, right, .. } = *wake;
-    let is_weak =
-        |one: &Vortex, other: &Vortex| one.circulation_m2_s < WEAK * other.circulation_m2_s;
-    let beside = |own: Vortex, by_m: f64| Vortex {
-        lateral_position_m: own.lateral_position_m + by_m,
-        ..own
-    };
-    if is_weak(&left, &right) {
+    if left.circulation_m2_s < WEAK * right.circulation_m2_s {
         Some(Wake {
-            left: beside(right, -LONE_M),
+            left: right.beside(-LONE_M),
             ..*wake
         })
-    } else if is_weak(&right, &left) {
+    } else if right.circulation_m2_s < WEAK * left.circulation_m2_s {
         Some(Wake {
-            right: beside(left, LONE_M),
+            right: left.beside(LONE_M),
             ..*wake
         })
     } else {
@@ -88,22 +83,19 @@ pub(crate) fn with_typical_core(
     fit: impl Fn(&Wake) -> Result<MapFit, Error>,
 ) -> Result<MapFit, Error> {
     for _ in 0..ROUNDS {
-        let next = starts(&end.wake, options);
-        let off = |wake: &Wake| {
-            (end.wake.left.core_radius_m / wake.left.core_radius_m - 1.0).abs() > TYPICAL
-        };
-        match next.first() {
-            Some(wake) if options.free.core_radius == Sharing::Fixed && off(wake) => {
-                end = fit(wake)?
-            }
-            _ => break,
+        let next = with_start_cores(&end.wake, options)[0];
+        let ratio = end.wake.left.core_radius_m / next.left.core_radius_m;
+        let is_off = (ratio - 1.0).abs() > TYPICAL;
+        if options.free.core_radius != Sharing::Fixed || !is_off {
+            break;
         }
+        end = fit(&next)?;
     }
     Ok(end)
 }
 
 /// Chi-square of an end.
-fn chi2(end: &MapFit) -> f64 {
+pub(crate) fn chi2(end: &MapFit) -> f64 {
     end.tops.first().map_or(f64::INFINITY, |top| top.chi2)
 }
 

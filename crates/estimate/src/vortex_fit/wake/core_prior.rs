@@ -40,7 +40,12 @@ impl CorePrior {
         }
         let p = wake.to_array();
         let spacing_m = wake.spacing_m();
-        let term = |place: usize| {
+        let mut terms = Vec::new();
+        for place in groups
+            .iter()
+            .filter(|group| is_core(group))
+            .map(|group| group[0])
+        {
             let away = (p[place] / (self.median_ratio * spacing_m)).ln() / self.log_deviation;
             let mut all = [0.0; PARAMETERS];
             all[place] = (self.log_deviation * p[place]).recip();
@@ -48,13 +53,9 @@ impl CorePrior {
             all[Parameter::RightLateral as usize] = -all[Parameter::LeftLateral as usize];
             let mut slope = vec![0.0; groups.len()];
             gathered(groups, &all, &mut slope);
-            (away, slope)
-        };
-        groups
-            .iter()
-            .filter(|group| is_core(group))
-            .map(|group| term(group[0]))
-            .collect()
+            terms.push((away, slope));
+        }
+        terms
     }
 }
 
@@ -81,36 +82,34 @@ pub(crate) fn secondary_ratios(p: &[f64]) -> [(f64, f64); 2] {
 
 /// How many deviations each of these is away from what is known, and the derivatives of that by all free numbers.
 pub(crate) fn secondary_terms(p: &[f64], groups: &[Vec<usize>]) -> Vec<(f64, Vec<f64>)> {
-    let away = |p: &[f64]| {
-        let known = |(ratio, distance), log_core: f64| {
-            let core = (log_core - KNOWN_CORE.0.ln()) / KNOWN_CORE.1;
-            [
-                (ratio - KNOWN_RATIO.0) / KNOWN_RATIO.1,
-                (distance - KNOWN_DISTANCE.0) / KNOWN_DISTANCE.1,
-                core,
-            ]
-        };
-        let [left, right] = secondary_ratios(p);
-        let log_core = |side: usize| p[PARAMETERS + side * SECONDARY_PARAMETERS + 3];
-        [known(left, log_core(0)), known(right, log_core(1))]
-    };
-    let slopes = groups.iter().map(|group| {
+    let mut slopes: Vec<[f64; 6]> = Vec::with_capacity(groups.len());
+    for group in groups {
         let step = 1e-6 * p[group[0]].abs().max(1.0);
-        let at = |by: f64| away(&stepped(std::slice::from_ref(group), p, &[by]));
-        let ahead = at(step);
-        let behind = at(-step);
-        std::array::from_fn(|i| (ahead[i / 3][i % 3] - behind[i / 3][i % 3]) / (2.0 * step))
-    });
-    let slopes: Vec<[f64; 6]> = slopes.collect();
-    let here = away(p);
-    (0..6)
-        .map(|i| {
-            (
-                here[i / 3][i % 3],
-                slopes.iter().map(|slope| slope[i]).collect(),
-            )
-        })
-        .collect()
+        let [ahead, behind] = [step, -step].map(|by| {
+            let stepped = stepped(std::slice::from_ref(group), p, &[by]);
+            secondary_distances(&stepped)
+        });
+        slopes.push(std::array::from_fn(|i| {
+            (ahead[i] - behind[i]) / (2.0 * step)
+        }));
+    }
+    let mut terms = Vec::with_capacity(6);
+    for (i, distance) in secondary_distances(p).into_iter().enumerate() {
+        terms.push((distance, slopes.iter().map(|slope| slope[i]).collect()));
+    }
+    terms
+}
+
+/// Circulation, distance and core radius of the left, then of the right secondary vortex, in deviations from what is known of them.
+fn secondary_distances(p: &[f64]) -> [f64; 6] {
+    let mut distances = [0.0; 6];
+    for (side, (ratio, distance)) in secondary_ratios(p).into_iter().enumerate() {
+        let log_core = p[PARAMETERS + side * SECONDARY_PARAMETERS + 3];
+        distances[3 * side] = (ratio - KNOWN_RATIO.0) / KNOWN_RATIO.1;
+        distances[3 * side + 1] = (distance - KNOWN_DISTANCE.0) / KNOWN_DISTANCE.1;
+        distances[3 * side + 2] = (log_core - KNOWN_CORE.0.ln()) / KNOWN_CORE.1;
+    }
+    distances
 }
 
 /// Whether a free number moves core radii.

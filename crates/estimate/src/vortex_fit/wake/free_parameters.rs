@@ -93,17 +93,16 @@ impl FreeParameters {
 
     /// The same without the numbers of a vortex that a wake does not have: one without circulation.
     pub(crate) fn groups_of(&self, wake: &Wake) -> Vec<Vec<usize>> {
-        let has = |place: &usize| match place {
-            0 | 2 | 3 | 6 => wake.left.circulation_m2_s != 0.0,
-            1 | 4 | 5 | 7 => wake.right.circulation_m2_s != 0.0,
-            _ => true,
-        };
-        let own = |group: Vec<usize>| group.into_iter().filter(has).collect::<Vec<usize>>();
-        self.groups()
-            .into_iter()
-            .map(own)
-            .filter(|group| !group.is_empty())
-            .collect()
+        let mut groups = self.groups();
+        for group in &mut groups {
+            group.retain(|place| match place {
+                0 | 2 | 3 | 6 => wake.left.circulation_m2_s != 0.0,
+                1 | 4 | 5 | 7 => wake.right.circulation_m2_s != 0.0,
+                _ => true,
+            });
+        }
+        groups.retain(|group| !group.is_empty());
+        groups
     }
 
     /// A start that obeys the ties: common quantities at their mean.
@@ -143,10 +142,11 @@ pub(crate) fn gathered(groups: &[Vec<usize>], slope: &[f64], out: &mut [f64]) {
 /// Covariance of the parameters of a wake \[10, 10\] from that of the free numbers; fixed parameters have zeros.
 pub(crate) fn spread(groups: &[Vec<usize>], covariance: &Array2<f64>) -> Array2<f64> {
     // each place belongs to one free number at most
-    let number = |place: usize| groups.iter().position(|group| group.contains(&place));
+    let numbers: [Option<usize>; PARAMETERS] =
+        std::array::from_fn(|place| groups.iter().position(|group| group.contains(&place)));
     Array2::from_shape_fn((PARAMETERS, PARAMETERS), |(row, column)| {
-        number(row)
-            .zip(number(column))
+        numbers[row]
+            .zip(numbers[column])
             .map_or(0.0, |(i, j)| covariance[[i, j]])
     })
 }

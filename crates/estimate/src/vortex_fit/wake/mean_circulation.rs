@@ -29,9 +29,9 @@ impl CoreProfile {
             Self::LambOseen => {
                 let k = LAMB_OSEEN_BETA.sqrt() / core_radius_m;
                 let part = PI.sqrt() / (2.0 * k * width) * (erf(outer * k) - erf(inner * k));
-                let bell = |r: f64| r * (-(r * k).powi(2)).exp();
+                let [inner_bell, outer_bell] = [inner, outer].map(|r| r * (-(r * k).powi(2)).exp());
                 // d part / d k = (bells - k part) / k, d k / d core = - k / core
-                let slope = ((bell(outer) - bell(inner)) / width - part) / core_radius_m;
+                let slope = ((outer_bell - inner_bell) / width - part) / core_radius_m;
                 (1.0 - part, slope)
             }
         }

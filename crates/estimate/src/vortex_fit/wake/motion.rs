@@ -3,7 +3,7 @@
 //! Over a scan of some seconds the velocity changes by per cents, so it is that of the middle of the scan.
 //! Check: the stored velocities of an independent program; difference quotients.
 
-use crate::vortex_fit::{PARAMETERS, Parameter, Wake, WakeModel};
+use crate::vortex_fit::{PARAMETERS, Parameter, Vortex, Wake, WakeModel};
 
 /// Places of the moving coordinates among the parameters: lateral position and height of the left, then of the right vortex.
 const MOVING: std::ops::Range<usize> =
@@ -22,13 +22,11 @@ impl Motion {
         let mut slopes = [[0.0; PARAMETERS]; 4];
         for place in 0..PARAMETERS {
             let step = 1e-4 * wake.to_array()[place].abs().max(1.0);
-            let moved = |by: f64| {
+            let [ahead, behind] = [step, -step].map(|by| {
                 let mut p = wake.to_array();
                 p[place] += by;
                 model.centre_velocities_m_s(&Wake::from_array(&p))
-            };
-            let ahead = moved(step);
-            let behind = moved(-step);
+            });
             for ((row, ahead), behind) in slopes.iter_mut().zip(ahead).zip(behind) {
                 row[place] = (ahead - behind) / (2.0 * step);
             }
@@ -73,36 +71,40 @@ impl WakeModel {
     #[must_use]
     pub fn sees(&self, (elevation_rad, range_m): (&[f64], &[f64]), place_m: (f64, f64)) -> bool {
         let (at_m, at_rad) = self.range_and_elevation(place_m);
-        let within = |axis: &[f64], at: f64| {
-            axis.first()
-                .zip(axis.last())
-                .is_some_and(|(a, b)| (*a..=*b).contains(&at))
-        };
-        within(range_m, at_m) && within(elevation_rad, at_rad)
+        spans(range_m, at_m) && spans(elevation_rad, at_rad)
     }
 
     /// Velocities \[m/s\] that the other vortex, the images and the wind have at the centres: lateral and vertical of the left, lateral
     /// and vertical of the right vortex.
     #[must_use]
     pub fn centre_velocities_m_s(&self, wake: &Wake) -> [f64; 4] {
-        let at = |own: &crate::vortex_fit::Vortex| {
-            let mut lateral_m_s = wake.lateral_wind_m_s + wake.wind_shear_per_s * own.height_m;
-            let mut vertical_m_s = 0.0;
-            for (vortex, _, side, sense) in self.sources(wake) {
-                let dy = own.lateral_position_m - vortex.lateral_position_m;
-                let dz = own.height_m - side * vortex.height_m;
-                let (omega, _, _) = self
-                    .profile
-                    .angular(dy * dy + dz * dz, vortex.core_radius_m);
-                lateral_m_s -= sense * vortex.circulation_m2_s * omega * dz;
-                vertical_m_s += sense * vortex.circulation_m2_s * omega * dy;
-            }
-            [lateral_m_s, vertical_m_s]
-        };
-        let [a, b] = at(&wake.left);
-        let [c, d] = at(&wake.right);
-        [a, b, c, d]
+        let [left_y, left_z] = self.centre_velocity_m_s(wake, &wake.left);
+        let [right_y, right_z] = self.centre_velocity_m_s(wake, &wake.right);
+        [left_y, left_z, right_y, right_z]
     }
+
+    /// Lateral and vertical velocity \[m/s\] of the wind and the vortices of a wake at the centre of one of them.
+    fn centre_velocity_m_s(&self, wake: &Wake, own: &Vortex) -> [f64; 2] {
+        let mut lateral_m_s = wake.lateral_wind_m_s + wake.wind_shear_per_s * own.height_m;
+        let mut vertical_m_s = 0.0;
+        for (vortex, _, side, sense) in self.sources(wake) {
+            let dy = own.lateral_position_m - vortex.lateral_position_m;
+            let dz = own.height_m - side * vortex.height_m;
+            let (omega, _, _) = self
+                .profile
+                .angular(dy * dy + dz * dz, vortex.core_radius_m);
+            lateral_m_s -= sense * vortex.circulation_m2_s * omega * dz;
+            vertical_m_s += sense * vortex.circulation_m2_s * omega * dy;
+        }
+        [lateral_m_s, vertical_m_s]
+    }
+}
+
+/// Whether a value lies between the first and the last of an increasing axis.
+fn spans(axis: &[f64], value: f64) -> bool {
+    axis.first()
+        .zip(axis.last())
+        .is_some_and(|(first, last)| (*first..=*last).contains(&value))
 }
 
 #[cfg(test)]

@@ -79,9 +79,26 @@ impl Vortex {
         (self.lateral_position_m, self.height_m)
     }
 
+    /// The same vortex `offset_m` to the right.
+    pub(crate) fn beside(&self, offset_m: f64) -> Self {
+        Self {
+            lateral_position_m: self.lateral_position_m + offset_m,
+            ..*self
+        }
+    }
+
     /// Distance of the centre from a place.
     pub(crate) fn away_m(&self, (lateral_m, height_m): (f64, f64)) -> f64 {
         (lateral_m - self.lateral_position_m).hypot(height_m - self.height_m)
+    }
+
+    /// The secondary vortex of that circulation, lateral coordinate, height and logarithm of the core radius over the height of this vortex.
+    fn secondary(
+        &self,
+        [circulation_m2_s, lateral_m, height_m, log_core]: [f64; SECONDARY_PARAMETERS],
+    ) -> Self {
+        let core_radius_m = self.height_m * log_core.exp();
+        Self::at((lateral_m, height_m), circulation_m2_s, core_radius_m)
     }
 
     pub(crate) fn validate(&self) -> Result<(), Error> {
@@ -353,15 +370,8 @@ impl WakeModel {
     /// The model and the wake of a list of parameters: those of a wake and, if there are more, those of a secondary vortex beside each vortex.
     pub(crate) fn with(&self, p: &[f64]) -> (Self, Wake) {
         let wake = Wake::from_list(p);
-        let of = |own: &Vortex, [circulation_m2_s, lateral_m, height_m, log_core]: [f64; _]| {
-            Vortex::at(
-                (lateral_m, height_m),
-                circulation_m2_s,
-                own.height_m * log_core.exp(),
-            )
-        };
-        let secondary = match p[PARAMETERS..].as_chunks::<SECONDARY_PARAMETERS>().0 {
-            [left, right] => Some([of(&wake.left, *left), of(&wake.right, *right)]),
+        let secondary = match p[PARAMETERS..].as_chunks().0 {
+            [left, right] => Some([wake.left.secondary(*left), wake.right.secondary(*right)]),
             _ => self.secondary,
         };
         (Self { secondary, ..*self }, wake)
@@ -379,19 +389,17 @@ impl WakeModel {
         &self,
         wake: &'w Wake,
     ) -> impl Iterator<Item = (&'w Vortex, [usize; 4], f64, f64)> + use<'w> {
-        let left = (&wake.left, [0, 2, 3, 6]);
-        let right = (&wake.right, [1, 4, 5, 7]);
+        const LEFT: [usize; 4] = [0, 2, 3, 6];
+        const RIGHT: [usize; 4] = [1, 4, 5, 7];
         let images = self.images;
-        let of = move |((vortex, places), side, sense)| (vortex, places, side, sense);
         let all = [
-            (left, 1.0, -1.0),
-            (left, -1.0, 1.0),
-            (right, 1.0, 1.0),
-            (right, -1.0, -1.0),
+            (&wake.left, LEFT, 1.0, -1.0),
+            (&wake.left, LEFT, -1.0, 1.0),
+            (&wake.right, RIGHT, 1.0, 1.0),
+            (&wake.right, RIGHT, -1.0, -1.0),
         ];
         all.into_iter()
-            .filter(move |source| images || source.1 > 0.0)
-            .map(of)
+            .filter(move |source| images || source.2 > 0.0)
     }
 
     /// Radial velocities at points of a line with their derivatives.

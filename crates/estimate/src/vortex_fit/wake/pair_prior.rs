@@ -46,34 +46,39 @@ impl PairPrior {
     /// Distances from the prior in standard deviations, and their derivatives by all free numbers: of the spacing where both lateral positions are
     /// free, of the circulations where both are.
     pub(crate) fn terms(&self, wake: &Wake, groups: &[Vec<usize>]) -> Vec<(f64, Vec<f64>)> {
-        let are_free = |pair: [usize; 2]| {
-            pair.iter()
-                .all(|place| groups.iter().any(|group| group.contains(place)))
-        };
         let mut terms = Vec::new();
-        let mut add = |away: f64, pair: [usize; 2], by_pair: [f64; 2]| {
-            let mut all = [0.0; PARAMETERS];
-            all[pair[0]] = by_pair[0];
-            all[pair[1]] = by_pair[1];
-            let mut slope = vec![0.0; groups.len()];
-            gathered(groups, &all, &mut slope);
-            terms.push((away, slope));
-        };
         let [left, right] = [wake.left.circulation_m2_s, wake.right.circulation_m2_s];
         let sum = left + right;
-        if are_free(CIRCULATIONS) && sum > 0.0 {
+        if are_free(CIRCULATIONS, groups) && sum > 0.0 {
             let away = 2.0 * (left - right) / sum / self.relative_difference;
             let by = 4.0 / (sum * sum * self.relative_difference);
-            add(away, CIRCULATIONS, [by * right, -by * left]);
+            let slopes = slopes(CIRCULATIONS, [by * right, -by * left], groups);
+            terms.push((away, slopes));
         }
         let spacing_m = wake.spacing_m();
-        if are_free(LATERAL) && spacing_m > 0.0 {
+        if are_free(LATERAL, groups) && spacing_m > 0.0 {
             let away = (spacing_m / self.median_spacing_m).ln() / self.log_deviation;
             let by = (self.log_deviation * spacing_m).recip();
-            add(away, LATERAL, [-by, by]);
+            terms.push((away, slopes(LATERAL, [-by, by], groups)));
         }
         terms
     }
+}
+
+/// Whether both parameters of a pair are free.
+fn are_free(pair: [usize; 2], groups: &[Vec<usize>]) -> bool {
+    pair.iter()
+        .all(|place| groups.iter().any(|group| group.contains(place)))
+}
+
+/// Derivatives by all free numbers, given those by a pair of parameters.
+fn slopes(pair: [usize; 2], by_pair: [f64; 2], groups: &[Vec<usize>]) -> Vec<f64> {
+    let mut all = [0.0; PARAMETERS];
+    all[pair[0]] = by_pair[0];
+    all[pair[1]] = by_pair[1];
+    let mut slopes = vec![0.0; groups.len()];
+    gathered(groups, &all, &mut slopes);
+    slopes
 }
 
 #[cfg(test)]

@@ -29,6 +29,11 @@ impl PulseShape {
         (-0.5 * (time_s / self.sigma_s).powi(2)).exp() / (PI.sqrt() * self.sigma_s).sqrt()
     }
 
+    /// f(`middle_s` + `apart_s`) f(`middle_s` - `apart_s`) \[1/s\]: what a pair of samples sees of the air.
+    fn pair(&self, middle_s: f64, apart_s: f64) -> f64 {
+        self.at(middle_s + apart_s) * self.at(middle_s - apart_s)
+    }
+
     /// Largest time \[s\] at which f^2 matters: 1e-7 of its peak.
     pub(crate) fn reach_s(&self) -> f64 {
         4.0 * self.sigma_s
@@ -55,33 +60,30 @@ impl PairWeights {
     pub(crate) fn new(pulse: &PulseShape, interval_s: f64, samples: usize, cut: f64) -> Self {
         let step_s = 0.5 * interval_s;
         let half = (pulse.reach_s() / step_s).ceil() as usize;
-        let weight = |node: i64, lag: usize| {
-            let middle_s = node as f64 * step_s;
-            let apart_s = lag as f64 * step_s;
-            pulse.at(middle_s + apart_s) * pulse.at(middle_s - apart_s)
-        };
         let nodes = -(half as i64)..=half as i64;
-        let covariance = |lag: usize| {
-            nodes
+        let mut longest = 0;
+        for lag in (0..samples).rev() {
+            let apart_s = lag as f64 * step_s;
+            let weights = nodes
                 .clone()
-                .map(|node| weight(node, lag) * step_s)
-                .sum::<f64>()
-                .abs()
-        };
-        let longest = (0..samples)
-            .rev()
-            .find(|&lag| covariance(lag) > cut)
-            .unwrap_or(0);
+                .map(|node| pulse.pair(node as f64 * step_s, apart_s) * step_s);
+            if weights.sum::<f64>().abs() > cut {
+                longest = lag;
+                break;
+            }
+        }
         let mut weights = Self {
             lags: longest,
             half,
             even: longest / 2 + 1,
             rows: Vec::new(),
         };
-        let places = nodes.flat_map(|node| weights.lag_of_place().map(move |lag| (node, lag)));
-        weights.rows = places
-            .map(|(node, lag)| weight(node, lag) * step_s)
-            .collect();
+        for node in nodes {
+            for lag in weights.lag_of_place() {
+                let weight = pulse.pair(node as f64 * step_s, lag as f64 * step_s);
+                weights.rows.push(weight * step_s);
+            }
+        }
         weights
     }
 

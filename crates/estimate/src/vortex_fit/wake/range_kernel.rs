@@ -64,12 +64,11 @@ impl RangeKernel {
         let weights: Vec<f64> = (-reach..=reach)
             .map(|i| {
                 let time_s = 2.0 * i as f64 * spacing_m / SPEED_OF_LIGHT_M_S;
-                let away = |n: usize| (time_s - n as f64 * period_s + half_s) / pulse_sigma_s;
-                window
-                    .iter()
-                    .enumerate()
-                    .map(|(n, h)| h * h * (-away(n) * away(n)).exp())
-                    .sum()
+                let terms = window.iter().enumerate().map(|(n, h)| {
+                    let away = (time_s - n as f64 * period_s + half_s) / pulse_sigma_s;
+                    h * h * (-away * away).exp()
+                });
+                terms.sum()
             })
             .collect();
         Self::new(-(reach as f64) * spacing_m, spacing_m, &weights)
@@ -77,15 +76,17 @@ impl RangeKernel {
 
     /// Root mean square width of the weights \[m\].
     pub(crate) fn width_m(&self) -> f64 {
-        let moment = |power: i32, centre_m: f64| -> f64 {
-            let offsets = (0..self.weights.len())
-                .map(|i| self.first_offset_m + i as f64 * self.spacing_m - centre_m);
-            offsets
-                .zip(&self.weights)
-                .map(|(offset_m, w)| offset_m.powi(power) * w)
-                .sum()
-        };
-        moment(2, moment(1, 0.0)).max(0.0).sqrt()
+        self.moment(2, self.moment(1, 0.0)).max(0.0).sqrt()
+    }
+
+    /// Moment of the weights about an offset from the range of the gate.
+    fn moment(&self, power: i32, centre_m: f64) -> f64 {
+        let offsets = (0..self.weights.len())
+            .map(|i| self.first_offset_m + i as f64 * self.spacing_m - centre_m);
+        offsets
+            .zip(&self.weights)
+            .map(|(offset_m, w)| offset_m.powi(power) * w)
+            .sum()
     }
 
     /// How often the distance of its points goes into a length \[m\], rounded down.
@@ -118,11 +119,8 @@ impl RangeKernel {
         if factor <= 1 || self.weights.len() <= factor {
             return self.clone();
         }
-        let weights: Vec<f64> = self
-            .weights
-            .chunks(factor)
-            .map(|chunk| chunk.iter().sum())
-            .collect();
+        let chunks = self.weights.chunks(factor);
+        let weights = chunks.map(|chunk| chunk.iter().sum()).collect();
         Self {
             first_offset_m: self.first_offset_m + 0.5 * (factor - 1) as f64 * self.spacing_m,
             spacing_m: factor as f64 * self.spacing_m,

@@ -64,11 +64,11 @@ impl Follower {
             );
             let core2 = vortex.core_radius_m.powi(2) + away_m.1.powi(2);
             let core = core2.sqrt();
-            let upto = |y: f64| {
-                let u = y - away_m.0;
+            let [to_left, to_right] = [-0.5, 0.5].map(|semispan| {
+                let u = semispan * self.span_m - away_m.0;
                 u - core * (u / core).atan() + 0.5 * away_m.0 * (u * u + core2).ln()
-            };
-            sense * vortex.circulation_m2_s * (upto(0.5 * self.span_m) - upto(-0.5 * self.span_m))
+            });
+            sense * vortex.circulation_m2_s * (to_right - to_left)
         });
         Ok(slope / (2.0 * PI * self.speed_m_s * self.span_m.powi(2)) * moments.sum::<f64>())
     }

@@ -52,21 +52,28 @@ pub(crate) fn region(
     range_m: f64,
     radius_m: f64,
 ) -> impl Iterator<Item = (usize, f64)> {
-    let chord = move |other: usize| {
-        let away_m = range_m * (elevation_rad[line] - elevation_rad[other]).abs();
-        (radius_m * radius_m - away_m * away_m).max(0.0).sqrt()
-    };
-    let first = (0..line)
-        .rev()
-        .take_while(|&other| chord(other) > 0.0)
-        .last()
-        .unwrap_or(line);
-    let last = (line + 1..elevation_rad.len())
-        .take_while(|&other| chord(other) > 0.0)
-        .last()
-        .unwrap_or(line);
-    let sum: f64 = (first..=last).map(chord).sum();
-    (first..=last).map(move |other| (other, if sum > 0.0 { chord(other) / sum } else { 1.0 }))
+    let own_rad = elevation_rad[line];
+    let mut first = line;
+    while first > 0 && chord_m(range_m * (own_rad - elevation_rad[first - 1]), radius_m) > 0.0 {
+        first -= 1;
+    }
+    let mut last = line;
+    while last + 1 < elevation_rad.len()
+        && chord_m(range_m * (own_rad - elevation_rad[last + 1]), radius_m) > 0.0
+    {
+        last += 1;
+    }
+    let chords_m = elevation_rad[first..=last]
+        .iter()
+        .map(move |other_rad| chord_m(range_m * (own_rad - other_rad), radius_m));
+    let sum_m: f64 = chords_m.clone().sum();
+    let lines = (first..=last).zip(chords_m);
+    lines.map(move |(other, chord_m)| (other, if sum_m > 0.0 { chord_m / sum_m } else { 1.0 }))
+}
+
+/// Half the chord that a circle cuts of a line at a distance from its centre; 0 outside.
+fn chord_m(away_m: f64, radius_m: f64) -> f64 {
+    (radius_m * radius_m - away_m * away_m).max(0.0).sqrt()
 }
 
 #[cfg(test)]
