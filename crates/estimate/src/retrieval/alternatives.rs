@@ -11,11 +11,12 @@ use crate::Measured;
 use crate::error::Error;
 use crate::retrieval::hypotheses::{End, Kind, Stage, best};
 use crate::retrieval::report::{Chosen, Report};
-use crate::retrieval::{Flag, ScanResult, VortexResult};
+use crate::retrieval::{Flag, ScanResult, Side, VortexResult};
+use crate::vortex_fit::map_fit::data::nearest_index;
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::tolerances::{COMPETES, EVALUATION, MINIMUM, NEGLIGIBLE, SPACING};
 use crate::vortex_fit::top::mixed;
-use crate::vortex_fit::{Parameter, Vortex, Wake};
+use crate::vortex_fit::{Parameter, Wake};
 
 /// Spacings of the pairs behind aircraft in service \[m\]: pi/4 of spans of 20 to 80 m, one as likely as another in its logarithm.
 const SPACINGS_M: (f64, f64) = (16.0, 63.0);
@@ -42,7 +43,26 @@ impl Alternative {
             weight: 1.0,
         })
     }
+
+    /// Whether its likelihood competes with the largest one, that of `least_chi2`.
+    fn competes(&self, least_chi2: f64, variance: f64) -> bool {
+        self.end.chi2 - least_chi2 < COMPETES * variance
+    }
+
+    fn log_spacing(&self) -> f64 {
+        self.end.wake.spacing_m().ln()
+    }
+
+    /// Mean square about `value` of one of the numbers of the vortex on that side, times the weight; nothing if it has none.
+    fn weighted_square(&self, side: Side, number: Number, value: f64) -> Option<f64> {
+        let mut vortex = *self.vortices.iter().find(|vortex| vortex.side == side)?;
+        let own = number(&mut vortex)?;
+        Some(self.weight * (own.std * own.std + (own.value - value).powi(2)))
+    }
 }
+
+/// Reads one of the numbers of a vortex.
+type Number = fn(&mut VortexResult) -> Option<&mut Measured>;
 
 /// The result of a report, its deviations those of all that the scan allows.
 pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error> {
@@ -74,19 +94,10 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
     if report.stage.options.other_profile {
         all.extend(of_other_profile(report, end, most)?);
     }
-    let least = all
-        .iter()
-        .fold(f64::INFINITY, |least, one| least.min(one.end.chi2));
-    all.iter_mut()
-        .for_each(|one| one.weight = (-0.5 * (one.end.chi2 - least) / variance).exp());
-    let sum: f64 = all.iter().map(|one| one.weight).sum();
-    all.iter_mut().for_each(|one| one.weight /= sum);
-    let competes = |one: &Alternative| one.end.chi2 - least < COMPETES * variance;
-    let apart =
-        |one: &Alternative| (one.end.wake.spacing_m() / end.wake.spacing_m()).ln().abs() > APART;
-    let is_ambiguous = all[..spacings]
-        .iter()
-        .any(|one| competes(one) && apart(one));
+    let least_chi2 = weigh(&mut all, variance);
+    let is_ambiguous = all[..spacings].iter().any(|one| {
+        one.competes(least_chi2, variance) && is_other_spacing(&one.end.wake, &end.wake)
+    });
     let reported = if is_ambiguous {
         nearest_to_the_mean_spacing(&all[..spacings])
     } else {
@@ -100,16 +111,38 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
         .vortices
         .iter_mut()
         .for_each(|vortex| widen(vortex, &all));
+    let is_ambiguous =
+        is_ambiguous || may_be_pair(report, end, variance) || result.has(Flag::Ambiguous);
+    result.set(Flag::Ambiguous, is_ambiguous);
+    Ok(result)
+}
+
+/// Gives each alternative its likelihood as a weight, with a sum of 1, and returns the least chi-square.
+fn weigh(all: &mut [Alternative], variance: f64) -> f64 {
+    let least_chi2 = all
+        .iter()
+        .fold(f64::INFINITY, |least, one| least.min(one.end.chi2));
+    for one in all.iter_mut() {
+        one.weight = (-0.5 * (one.end.chi2 - least_chi2) / variance).exp();
+    }
+    let sum: f64 = all.iter().map(|one| one.weight).sum();
+    for one in all.iter_mut() {
+        one.weight /= sum;
+    }
+    least_chi2
+}
+
+fn is_other_spacing(wake: &Wake, reference: &Wake) -> bool {
+    (wake.spacing_m() / reference.spacing_m()).ln().abs() > APART
+}
+
+/// Whether a pair that the gates do not resolve competes with the one vortex of `end`.
+fn may_be_pair(report: &Report<'_>, end: &End, variance: f64) -> bool {
     let pair = best(report.ends, Kind::Both).filter(|_| end.kind != Kind::Both);
-    let may_be_pair = pair.is_some_and(|pair| {
+    pair.is_some_and(|pair| {
         pair.chi2 - end.chi2 < COMPETES * variance
             && !report.stage.options.gate.resolves(pair.wake.spacing_m())
-    });
-    result.set(
-        Flag::Ambiguous,
-        is_ambiguous || may_be_pair || result.has(Flag::Ambiguous),
-    );
-    Ok(result)
+    })
 }
 
 /// Fits of pairs with given spacings, where gates are long: away from that of the end as far as chi-squares stay below `most`.
@@ -119,11 +152,10 @@ fn other_spacings(report: &Report<'_>, end: &End, most: f64) -> Vec<End> {
         Parameter::RightLateral as usize,
     ];
     let spacing_m = end.wake.spacing_m();
-    let is_free = |place: &usize| end.groups.iter().any(|group| group == &[*place]);
-    if end.kind != Kind::Both
-        || !lateral.iter().all(is_free)
-        || report.stage.options.gate.resolves(spacing_m)
-    {
+    let are_free = lateral
+        .iter()
+        .all(|place| end.groups.contains(&vec![*place]));
+    if end.kind != Kind::Both || !are_free || report.stage.options.gate.resolves(spacing_m) {
         return Vec::new();
     }
     let fits = report.stage;
@@ -171,16 +203,12 @@ fn other_spacings(report: &Report<'_>, end: &End, most: f64) -> Vec<End> {
 fn with_spacing(wake: &Wake, spacing_m: f64) -> Wake {
     let middle_m = 0.5 * (wake.left.lateral_position_m + wake.right.lateral_position_m);
     let ratio = spacing_m / wake.spacing_m();
-    let vortex = |own: &Vortex| Vortex {
-        circulation_m2_s: own.circulation_m2_s / ratio,
-        lateral_position_m: middle_m + ratio * (own.lateral_position_m - middle_m),
-        ..*own
-    };
-    Wake {
-        left: vortex(&wake.left),
-        right: vortex(&wake.right),
-        ..*wake
+    let mut wake = *wake;
+    for vortex in [&mut wake.left, &mut wake.right] {
+        vortex.circulation_m2_s /= ratio;
+        vortex.lateral_position_m = middle_m + ratio * (vortex.lateral_position_m - middle_m);
     }
+    wake
 }
 
 /// The fit with the other profile, from the end of the stated one, unless its chi-square is above `most`.
@@ -216,19 +244,20 @@ fn of_other_profile(
 
 /// The end whose spacing is nearest to the mean of all by weight, in the logarithm.
 fn nearest_to_the_mean_spacing(all: &[Alternative]) -> &End {
-    let of = |one: &Alternative| one.end.wake.spacing_m().ln();
+    let log_spacings: Vec<f64> = all.iter().map(Alternative::log_spacing).collect();
     let sum: f64 = all.iter().map(|one| one.weight).sum();
-    let mean = all.iter().map(|one| one.weight * of(one)).sum::<f64>() / sum;
-    let away = |i: &usize| (of(&all[*i]) - mean).abs();
-    &all[(0..all.len())
-        .min_by(|a, b| away(a).total_cmp(&away(b)))
-        .unwrap_or(0)]
-    .end
+    let mean = all
+        .iter()
+        .zip(&log_spacings)
+        .map(|(one, log_spacing)| one.weight * log_spacing)
+        .sum::<f64>()
+        / sum;
+    &all[nearest_index(&log_spacings, mean).unwrap_or(0)].end
 }
 
 /// Deviations of a vortex become those of all that the scan allows, each at its own line and with its own profile.
 fn widen(vortex: &mut VortexResult, all: &[Alternative]) {
-    const NUMBERS: [fn(&mut VortexResult) -> Option<&mut Measured>; 5] = [
+    const NUMBERS: [Number; 5] = [
         |vortex| Some(&mut vortex.circulation_m2_s),
         |vortex| Some(&mut vortex.circulation_5_15_m2_s),
         |vortex| Some(&mut vortex.lateral_position_m),
@@ -239,15 +268,10 @@ fn widen(vortex: &mut VortexResult, all: &[Alternative]) {
         let Some(own) = number(vortex).map(|own| own.value) else {
             continue;
         };
-        let square = |one: &Alternative| -> Option<f64> {
-            let mut other = *one
-                .vortices
-                .iter()
-                .find(|other| other.side == vortex.side)?;
-            let Measured { value, std } = *number(&mut other)?;
-            Some(one.weight * (std * std + (value - own).powi(2)))
-        };
-        let squares: f64 = all.iter().filter_map(square).sum();
+        let squares: f64 = all
+            .iter()
+            .filter_map(|one| one.weighted_square(vortex.side, number, own))
+            .sum();
         if let Some(own) = number(vortex) {
             own.std = squares.sqrt();
         }

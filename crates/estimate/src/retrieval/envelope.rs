@@ -19,7 +19,7 @@ use crate::Measured;
 use crate::error::{Error, length, positive};
 use crate::estimators::tails::bisected;
 use crate::retrieval::Side;
-use crate::vortex_fit::map_fit::data::validate_axes;
+use crate::vortex_fit::map_fit::data::{nearest_index, validate_axes};
 use crate::vortex_fit::{Vortex, Wake, WakeModel};
 use crate::window::SPEED_OF_LIGHT_M_S;
 
@@ -77,10 +77,10 @@ impl SpectralShape {
 
     /// Expected power over the noise at a velocity, given the velocities of the air with their weights.
     fn power(&self, air: &[(f64, f64)], snr: f64, velocity_m_s: f64) -> f64 {
-        let line = |(weight, air_m_s): &(f64, f64)| {
+        let lines = air.iter().map(|(weight, air_m_s)| {
             weight * (-((velocity_m_s - air_m_s) / self.width_m_s).powi(2)).exp()
-        };
-        1.0 + snr * self.band_m_s / (self.width_m_s * PI.sqrt()) * air.iter().map(line).sum::<f64>()
+        });
+        1.0 + snr * self.band_m_s / (self.width_m_s * PI.sqrt()) * lines.sum::<f64>()
     }
 
     /// Outermost velocity \[m/s\] in the direction of `sign` where the expected spectrum of a line of sight falls through the threshold;
@@ -181,94 +181,132 @@ pub fn velocity_envelopes(
     positive("snr", spectra.snr)?;
     positive("threshold - 1", threshold - 1.0)?;
     about.validate()?;
-    Ok(Side::BOTH.map(|side| one(spectra, shape, (model, about), side, threshold)))
+    Ok(Side::BOTH.map(|side| {
+        let envelopes = Envelopes {
+            spectra,
+            shape,
+            model,
+            about,
+            side,
+            threshold,
+        };
+        envelopes.result()
+    }))
 }
 
-fn one(
-    spectra: &ScanSpectra<'_>,
-    shape: &SpectralShape,
-    (model, about): (&WakeModel, &Wake),
+/// Spectra of a scan with the vortex whose envelopes they show.
+struct Envelopes<'a, 's> {
+    spectra: &'a ScanSpectra<'s>,
+    shape: &'a SpectralShape,
+    model: &'a WakeModel,
+    /// The wake that the vortex is part of.
+    about: &'a Wake,
     side: Side,
     threshold: f64,
-) -> EnvelopeResult {
-    let (vortex, sense) = if side == Side::Left {
-        (about.left, -1.0)
-    } else {
-        (about.right, 1.0)
-    };
-    let (range_m, elevation_rad) = model.range_and_elevation(vortex.place_m());
-    let away = |gate: &usize| (spectra.range_m[*gate] - range_m).abs();
-    let gate = (0..spectra.range_m.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
-    let mut raw = vec![];
-    let mut narrowed = vec![];
-    let mut inverted = vec![];
-    let mut left_out = 0;
-    let calm = shape.calm_width_m_s(spectra.snr, threshold).unwrap_or(0.0);
-    let share = model.profile.mean_5_15(vortex.core_radius_m).0;
-    for (line, elevation) in spectra.elevation_rad.iter().enumerate() {
-        let off_m = range_m * (elevation - elevation_rad).sin();
-        let Some(gate) = gate.filter(|_| (OFF_M.0..=OFF_M.1).contains(&off_m.abs())) else {
-            continue;
-        };
+}
+
+impl Envelopes<'_, '_> {
+    /// The circulation of the vortex from all lines that pass it at the radii that are used.
+    fn result(&self) -> EnvelopeResult {
+        let spectra = self.spectra;
+        let position_m = self.vortex().place_m();
+        let (range_m, elevation_rad) = self.model.range_and_elevation(position_m);
+        let gate = nearest_index(spectra.range_m, range_m);
+        let mut circulations_m2_s = vec![];
+        let mut left_out = 0;
+        for (line, elevation) in spectra.elevation_rad.iter().enumerate() {
+            let off_m = range_m * (elevation - elevation_rad).sin();
+            let Some(gate) = gate.filter(|_| (OFF_M.0..=OFF_M.1).contains(&off_m.abs())) else {
+                continue;
+            };
+            match self.circulations_m2_s(line, gate, off_m) {
+                Some(of_line) => circulations_m2_s.push(of_line),
+                None => left_out += 1,
+            }
+        }
+        let count = circulations_m2_s.len() as f64;
+        let [raw_m2_s, narrowed_m2_s, value] = [0, 1, 2].map(|method| {
+            let of_method = circulations_m2_s.iter().map(|of_line| of_line[method]);
+            of_method.sum::<f64>() / count
+        });
+        let squares: f64 = circulations_m2_s
+            .iter()
+            .map(|[_, _, inverted_m2_s]| (inverted_m2_s - value).powi(2))
+            .sum();
+        EnvelopeResult {
+            side: self.side,
+            raw_m2_s,
+            narrowed_m2_s,
+            inverted_m2_s: Measured {
+                value,
+                std: (squares / (count - 1.0) / count).sqrt(),
+            },
+            lines: circulations_m2_s.len(),
+            left_out,
+        }
+    }
+
+    /// Raw, narrowed and inverted circulation from a line that passes the centre `off_m` above it; nothing without an envelope or if no
+    /// circulation has this one.
+    fn circulations_m2_s(&self, line: usize, gate: usize, off_m: f64) -> Option<[f64; 3]> {
+        let spectra = self.spectra;
         // above a left vortex the air goes away
+        let sense = if self.side == Side::Left { -1.0 } else { 1.0 };
         let sign = -sense * off_m.signum();
         let power = spectra.power.slice(ndarray::s![line, gate, ..]);
-        let Some(envelope) = measured(spectra.velocity_m_s, power, threshold, sign) else {
-            left_out += 1;
-            continue;
-        };
-        let place = (spectra.range_m[gate], *elevation);
-        let wind = (about.lateral_wind_m_s
-            + about.wind_shear_per_s * model.position_m(place.0, place.1).1)
-            * elevation.cos();
+        let envelope = measured(spectra.velocity_m_s, power, self.threshold, sign)?;
+        let place = (spectra.range_m[gate], spectra.elevation_rad[line]);
+        let height_m = self.model.position_m(place.0, place.1).1;
+        let wind =
+            (self.about.lateral_wind_m_s + self.about.wind_shear_per_s * height_m) * place.1.cos();
         let speed = sign * (envelope - wind);
-        let faster = |circulation_m2_s: f64| {
-            let own = Vortex {
-                circulation_m2_s,
-                ..vortex
-            };
-            let wake = if side == Side::Left {
-                Wake {
-                    left: own,
-                    ..*about
-                }
-            } else {
-                Wake {
-                    right: own,
-                    ..*about
-                }
-            };
-            let expected =
-                shape.expected_envelope_m_s((model, &wake), place, (spectra.snr, threshold), sign);
-            expected.is_some_and(|v| sign * v > sign * envelope)
-        };
         // upwards: very fast air is so spread out that nothing of it is above the threshold
-        let Some(step) = (1..=STEPS_UP).find(|step| faster(STEP_M2_S * f64::from(*step))) else {
-            left_out += 1;
-            continue;
-        };
+        let step = (1..=STEPS_UP)
+            .find(|step| self.is_faster(STEP_M2_S * f64::from(*step), place, sign, envelope))?;
         let [low, high] = [step - 1, step].map(|step| STEP_M2_S * f64::from(step));
         let [found, _] = bisected(low, high, HALVINGS, |circulation_m2_s| {
-            !faster(circulation_m2_s)
+            !self.is_faster(circulation_m2_s, place, sign, envelope)
         });
-        raw.push(2.0 * PI * off_m.abs() * speed);
-        narrowed.push(2.0 * PI * off_m.abs() * (speed - calm));
-        inverted.push(share * found);
+        let calm = self.shape.calm_width_m_s(spectra.snr, self.threshold);
+        let share = self.model.profile.mean_5_15(self.vortex().core_radius_m).0;
+        Some([
+            2.0 * PI * off_m.abs() * speed,
+            2.0 * PI * off_m.abs() * (speed - calm.unwrap_or(0.0)),
+            share * found,
+        ])
     }
-    let mean = |numbers: &[f64]| numbers.iter().sum::<f64>() / numbers.len() as f64;
-    let value = mean(&inverted);
-    let count = inverted.len() as f64;
-    let squares: f64 = inverted.iter().map(|x| (x - value).powi(2)).sum();
-    EnvelopeResult {
-        side,
-        raw_m2_s: mean(&raw),
-        narrowed_m2_s: mean(&narrowed),
-        inverted_m2_s: Measured {
-            value,
-            std: (squares / (count - 1.0) / count).sqrt(),
-        },
-        lines: inverted.len(),
-        left_out,
+
+    /// Whether the expected envelope of a vortex of that circulation lies beyond the measured one, at a range and an elevation.
+    fn is_faster(
+        &self,
+        circulation_m2_s: f64,
+        place: (f64, f64),
+        sign: f64,
+        envelope: f64,
+    ) -> bool {
+        let vortex = Vortex {
+            circulation_m2_s,
+            ..*self.vortex()
+        };
+        let mut wake = *self.about;
+        match self.side {
+            Side::Left => wake.left = vortex,
+            Side::Right => wake.right = vortex,
+        }
+        let expected = self.shape.expected_envelope_m_s(
+            (self.model, &wake),
+            place,
+            (self.spectra.snr, self.threshold),
+            sign,
+        );
+        expected.is_some_and(|v| sign * v > sign * envelope)
+    }
+
+    fn vortex(&self) -> &Vortex {
+        match self.side {
+            Side::Left => &self.about.left,
+            Side::Right => &self.about.right,
+        }
     }
 }
 
@@ -280,8 +318,9 @@ fn measured(
     sign: f64,
 ) -> Option<f64> {
     let last = velocity_m_s.len().checked_sub(1)?;
-    let cell = |i: usize| if sign > 0.0 { last - i } else { i };
-    let inner = (0..=last).map(cell).find(|i| power[*i] >= threshold)?;
+    let inner = (0..=last)
+        .map(|i| if sign > 0.0 { last - i } else { i })
+        .find(|i| power[*i] >= threshold)?;
     let outer = if sign > 0.0 {
         inner.checked_add(1).filter(|i| *i <= last)
     } else {

@@ -7,6 +7,7 @@ use crate::retrieval::{
     Flag, Movement, RetrievalOptions, ScanEstimator, ScanFit, ScanMap, ScanResult, VortexResult,
 };
 use crate::vortex_fit::map_fit::data::ends;
+use crate::vortex_fit::map_fit::starts::chi2;
 use crate::vortex_fit::{
     EstimatorResponse, MapFit, MapFitOptions, VelocityMap, Wake, fit_map_of_estimator,
     fit_secondary_vortices, refine_map_fit_of_estimator, with_local_circulations,
@@ -136,8 +137,10 @@ impl EstimateFits<'_> {
 
     /// Whether a pair is in view whose vortices the gates do not resolve.
     fn is_hidden(&self, pair: &ScanResult) -> bool {
-        let is_resolved = |wake: Wake| self.options.gate.resolves(wake.spacing_m());
-        self.unobserved(pair) == 0 && pair.wake.is_some_and(|wake| !is_resolved(wake))
+        self.unobserved(pair) == 0
+            && pair
+                .wake
+                .is_some_and(|wake| !self.options.gate.resolves(wake.spacing_m()))
     }
 
     /// The fit from a start or, without one, from a blind search on, and whether its vortices move: as requested, else as it is likely in scans
@@ -241,7 +244,6 @@ impl EstimateFits<'_> {
 
 /// Whether the chi-square of a fit is clearly less than that of another one.
 fn is_clearly_better(fit: &MapFit, than: &MapFit) -> bool {
-    let chi2 = |fit: &MapFit| fit.tops.first().map_or(f64::INFINITY, |top| top.chi2);
     chi2(than) - chi2(fit) > RetrievalOptions::MOVES
 }
 

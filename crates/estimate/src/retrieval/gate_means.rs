@@ -11,7 +11,7 @@ use crate::retrieval::hypotheses::{End, Kind, Stage, least, rivals};
 use crate::retrieval::report::{OUTLIER, Report};
 use crate::retrieval::whitening::Whitening;
 use crate::retrieval::{Flag, Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
-use crate::vortex_fit::map_fit::cells::Cell;
+
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::SEARCHED;
 use crate::vortex_fit::tolerances::MINIMUM;
@@ -217,15 +217,13 @@ fn in_scale<'a>(mut stage: Stage<'a>, likely: Option<&End>) -> (Stage<'a>, f64) 
 
 /// What makes the velocities of a stage white.
 fn whitening(stage: &Stage<'_>, turbulence: &Turbulence) -> Result<Whitening, Error> {
-    let place = |cell: &Cell| {
+    let mut places = Vec::with_capacity(stage.squares.cells.len());
+    for cell in &stage.squares.cells {
         let range_m = stage.map.range_m[cell.gate];
         let elevation_rad = stage.map.elevation_rad[cell.line];
-        (
-            stage.gates.model.position_m(range_m, elevation_rad),
-            cell.sigma_m_s,
-        )
-    };
-    let places: Vec<_> = stage.squares.cells.iter().map(place).collect();
+        let position_m = stage.gates.model.position_m(range_m, elevation_rad);
+        places.push((position_m, cell.sigma_m_s));
+    }
     Whitening::new(&places, turbulence).ok_or(Error::Linalg {
         what: "covariance of the velocities",
         order: places.len(),

@@ -30,10 +30,10 @@ impl<'a> Gates<'a> {
     ) -> Result<Self, Error> {
         options.gate.validate(&map.range_m)?;
         let step_m = uniform_step_m(&map.range_m);
-        let longest_m = |std_m: f64| coarser as f64 * 2.0 * REACH * std_m / (POINTS - 1) as f64;
+
         let kernel = match &options.gate {
             Gate::Gaussian { std_m } if *std_m > 0.0 => {
-                let longest_m = longest_m(*std_m);
+                let longest_m = longest_spacing_m(*std_m, coarser);
                 let spacing_m = step_m.map_or(longest_m, |step| step / (step / longest_m).ceil());
                 gaussian(
                     *std_m,
@@ -42,9 +42,8 @@ impl<'a> Gates<'a> {
                 )?
             }
             Gate::Kernel(kernel) => {
-                let factor = kernel
-                    .points_within(longest_m(kernel.width_m()))
-                    .max(coarser);
+                let longest_m = longest_spacing_m(kernel.width_m(), coarser);
+                let factor = kernel.points_within(longest_m).max(coarser);
                 step_m.map_or_else(
                     || kernel.coarser(factor),
                     |step_m| kernel.dividing(step_m, factor),
@@ -90,10 +89,18 @@ impl<'a> Gates<'a> {
     }
 }
 
-/// A Gaussian weight of so many points on either side.
+/// Largest distance of the points of a weight of that standard deviation, `coarser` times that of the end of a fit.
+fn longest_spacing_m(std_m: f64, coarser: usize) -> f64 {
+    coarser as f64 * 2.0 * REACH * std_m / (POINTS - 1) as f64
+}
+
+/// A Gaussian weight of N points on either side.
 fn gaussian(std_m: f64, spacing_m: f64, points: usize) -> Result<RangeKernel, Error> {
-    let weight = |i: usize| (-0.5 * ((i as f64 - points as f64) * spacing_m / std_m).powi(2)).exp();
-    let weights: Vec<f64> = (0..=2 * points).map(weight).collect();
+    let mut weights = Vec::with_capacity(2 * points + 1);
+    for i in 0..=2 * points {
+        let sigmas = (i as f64 - points as f64) * spacing_m / std_m;
+        weights.push((-0.5 * sigmas.powi(2)).exp());
+    }
     RangeKernel::new(-(points as f64) * spacing_m, spacing_m, &weights)
 }
 

@@ -55,26 +55,17 @@ impl Kind {
 
     /// The wake without the vortices that there are not.
     pub(crate) fn of(self, wake: &Wake) -> Wake {
-        let nowhere = |other: &Vortex, by_m: f64| Vortex {
-            circulation_m2_s: 0.0,
-            lateral_position_m: other.lateral_position_m + by_m,
-            ..*other
-        };
         match self {
             Self::Both => *wake,
             Self::Left => Wake {
-                right: nowhere(&wake.left, NOWHERE_M),
+                right: absent_beside(&wake.left, NOWHERE_M),
                 ..*wake
             },
             Self::Right => Wake {
-                left: nowhere(&wake.right, -NOWHERE_M),
+                left: absent_beside(&wake.right, -NOWHERE_M),
                 ..*wake
             },
-            Self::Wind => Wake {
-                left: nowhere(&wake.left, 0.0),
-                right: nowhere(&wake.right, 0.0),
-                ..*wake
-            },
+            Self::Wind => wake.wind_alone(),
         }
     }
 
@@ -83,6 +74,14 @@ impl Kind {
         let a = a.to_array();
         let b = b.to_array();
         (0..PARAMETERS).all(|i| (a[i] - b[i]).abs() <= part * a[i].abs().max(20.0) || !self.has(i))
+    }
+}
+
+/// A vortex without circulation, `offset_m` to the right of another one.
+fn absent_beside(other: &Vortex, offset_m: f64) -> Vortex {
+    Vortex {
+        circulation_m2_s: 0.0,
+        ..other.beside(offset_m)
     }
 }
 
@@ -96,6 +95,23 @@ pub(crate) struct End {
     pub(crate) sigmas_left: f64,
     /// Free numbers.
     pub(crate) groups: Vec<Vec<usize>>,
+}
+
+impl End {
+    /// Whether its vortices turn as those of an aircraft: a left vortex the other way round is a right one.
+    fn turns_as_aircraft(&self) -> bool {
+        let p = self.wake.to_array();
+        [Parameter::LeftCirculation, Parameter::RightCirculation]
+            .into_iter()
+            .all(|circulation| {
+                !self.kind.has(circulation as usize) || p[circulation as usize] > 0.0
+            })
+    }
+
+    /// Bayesian information criterion chi^2 + k ln N of a fit to N cells (Schwarz 1978).
+    fn information_criterion(&self, cells: usize) -> f64 {
+        self.chi2 + self.groups.len() as f64 * (cells as f64).ln()
+    }
 }
 
 /// Fits of one scan with one sight of it.
@@ -313,23 +329,22 @@ impl<'a> Stage<'a> {
         let curvature = products(&vec![1.0; rows.residuals.len()], &rows.slopes);
         let covariance = inverse("curvature of the fit", &curvature);
         let p = end.wake.to_array();
-        let vague = |(i, group): (usize, &Vec<usize>)| {
+        let mut vague = Vec::new();
+        for (i, group) in end.groups.iter().enumerate() {
+            if !is_core(group) {
+                continue;
+            }
             let core_m = p[group[0]];
             let deviation_m = covariance
                 .as_ref()
                 .map_or(f64::INFINITY, |c| c[[i, i]].sqrt());
-            // also true for NaN
-            !(deviation_m < RESOLVED * core_m && core_m < largest_m)
-        };
-        let cores = end
-            .groups
-            .iter()
-            .enumerate()
-            .filter(|(_, group)| is_core(group));
-        cores
-            .filter(|core| vague(*core))
-            .flat_map(|(_, group)| group.clone())
-            .collect()
+            // a NaN resolves nothing
+            let is_resolved = deviation_m < RESOLVED * core_m && core_m < largest_m;
+            if !is_resolved {
+                vague.extend(group);
+            }
+        }
+        vague
     }
 
     /// Ends of all starts; pairs also start fits of each of their vortices alone.
@@ -383,39 +398,33 @@ impl<'a> Stage<'a> {
 
 /// Rough ends without those that are the same or far worse than the best of their kind.
 pub(crate) fn rivals(ends: &[End], scale: f64) -> Vec<End> {
-    let hopeless = |end: &End| {
-        best(ends, end.kind).is_none_or(|best| end.chi2 > best.chi2 + HOPELESS * scale * scale)
-    };
-    let same = |other: &End, end: &End| {
+    let followed = ends.iter().filter(|end| !is_hopeless(end, ends, scale));
+    distinct(followed.cloned(), |other, end| {
         other.kind == end.kind && end.kind.same(&end.wake, &other.wake, ROUGHLY_SAME_FRACTION)
-    };
-    distinct(ends.iter().filter(|end| !hopeless(end)).cloned(), same)
+    })
 }
 
-/// The best end of a kind whose circulations have the sense of an aircraft's: a left vortex the other way round is a right one.
+/// Whether an end is far worse than the best one of its kind.
+fn is_hopeless(end: &End, ends: &[End], scale: f64) -> bool {
+    best(ends, end.kind).is_none_or(|best| end.chi2 > best.chi2 + HOPELESS * scale * scale)
+}
+
+/// The best end of a kind whose circulations have the sense of an aircraft's.
 pub(crate) fn best(ends: &[End], kind: Kind) -> Option<&End> {
-    let circulations = [
-        Parameter::LeftCirculation as usize,
-        Parameter::RightCirculation as usize,
-    ];
-    let turns = |end: &&End| {
-        circulations
-            .iter()
-            .all(|i| !kind.has(*i) || end.wake.to_array()[*i] > 0.0)
-    };
     ends.iter()
-        .filter(|end| end.kind == kind)
-        .filter(turns)
+        .filter(|end| end.kind == kind && end.turns_as_aircraft())
         .min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
-/// The end with the least chi^2 + k ln N.
+/// The end with the least information criterion among all kinds of wakes.
 pub(crate) fn least(ends: &[End], cells: usize) -> Option<&End> {
-    let cost = |end: &End| end.chi2 + end.groups.len() as f64 * (cells as f64).ln();
     let bests = [Kind::Left, Kind::Right, Kind::Both]
         .into_iter()
         .filter_map(|kind| best(ends, kind));
-    bests.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+    bests.min_by(|a, b| {
+        a.information_criterion(cells)
+            .total_cmp(&b.information_criterion(cells))
+    })
 }
 
 /// All ends of the kind of the best one that are not the same, the best first, given its covariance.
@@ -429,10 +438,10 @@ pub(crate) fn tops<'a>(
     distinct(sorted, |top, end| {
         let a = end.wake.to_array();
         let b = top.wake.to_array();
-        let near = |i: usize| {
+        (0..PARAMETERS).all(|i| {
             let sigma = covariance[[i, i]].sqrt();
-            (a[i] - b[i]).abs() <= (SAME_SIGMAS * sigma).max(SAME_FRACTION * a[i].abs().max(1.0))
-        };
-        (0..PARAMETERS).all(|i| near(i) || !end.kind.has(i))
+            let tolerance = (SAME_SIGMAS * sigma).max(SAME_FRACTION * a[i].abs().max(1.0));
+            (a[i] - b[i]).abs() <= tolerance || !end.kind.has(i)
+        })
     })
 }

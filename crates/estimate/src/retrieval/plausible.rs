@@ -54,16 +54,16 @@ const LIMITS: [Limit; 4] = [
 
 /// Velocities of a map within the largest spacing of a vortex.
 fn velocities_about(vortex: &VortexResult, map: &ScanMap, model: &WakeModel) -> usize {
-    let is_near = |range_m: f64, elevation_rad: f64| {
-        let (y_m, z_m) = model.position_m(range_m, elevation_rad);
-        (y_m - vortex.lateral_position_m.value).hypot(z_m - vortex.height_m.value) <= SPACING_M
-    };
-    let cells = map.velocity_m_s.indexed_iter();
-    cells
-        .filter(|((line, gate), velocity)| {
-            velocity.is_finite() && is_near(map.range_m[*gate], map.elevation_rad[*line])
-        })
-        .count()
+    let mut count = 0;
+    for ((line, gate), velocity) in map.velocity_m_s.indexed_iter() {
+        if velocity.is_finite() {
+            let (y_m, z_m) = model.position_m(map.range_m[gate], map.elevation_rad[line]);
+            let distance_m =
+                (y_m - vortex.lateral_position_m.value).hypot(z_m - vortex.height_m.value);
+            count += usize::from(distance_m <= SPACING_M);
+        }
+    }
+    count
 }
 
 /// Takes away vortices that are none of an aircraft or that the scan does not resolve, which makes the result one without a wake, flagged
@@ -73,13 +73,8 @@ pub fn without_implausible_vortices(
     map: &ScanMap,
     model: &WakeModel,
 ) -> Option<String> {
-    let beyond = |vortex: &VortexResult| {
-        LIMITS.iter().find_map(|limit| {
-            let value = (limit.value)(vortex, map, model);
-            (!limit.allowed.contains(&value)).then(|| limit.in_words(value))
-        })
-    };
-    let reason = result.vortices.iter().find_map(beyond)?;
+    let mut vortices = result.vortices.iter();
+    let reason = vortices.find_map(|vortex| violated_limit(vortex, map, model))?;
     result.vortices.clear();
     result.wake = None;
     // What is said of vortices is not said of none.
@@ -87,6 +82,14 @@ pub fn without_implausible_vortices(
     result.set(Flag::NoWake, true);
     result.set(Flag::Implausible, true);
     Some(reason)
+}
+
+/// The first limit that a vortex violates, in words.
+fn violated_limit(vortex: &VortexResult, map: &ScanMap, model: &WakeModel) -> Option<String> {
+    LIMITS.iter().find_map(|limit| {
+        let value = (limit.value)(vortex, map, model);
+        (!limit.allowed.contains(&value)).then(|| limit.in_words(value))
+    })
 }
 
 impl Limit {

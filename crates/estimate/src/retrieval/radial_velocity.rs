@@ -7,6 +7,7 @@
 //! Check: the errors that the literature and an independent program have.
 
 use ndarray::Array2;
+use std::ops::Range;
 
 use crate::Measured;
 use crate::error::{Error, enough_velocities};
@@ -32,21 +33,7 @@ pub fn radial_velocity_method(
 ) -> Result<ScanResult, Error> {
     options.validate()?;
     enough_velocities(map.validate()?, 100)?;
-    let fixed = Sharing::Fixed;
-    let free = FreeParameters {
-        lateral_position: fixed,
-        height: fixed,
-        core_radius: fixed,
-        ..options.free
-    };
-    let linear = RetrievalOptions {
-        free,
-        loss: Loss::Squares,
-        movement: Movement::Frozen,
-        turbulence: None,
-        core_prior: None,
-        ..options.clone()
-    };
+    let linear = of_linear_fit(options);
     let unfolded = Unfolded::new(map, options)?;
     let nothing = unfolded.with_wind(&Wake::from_array(&CALM));
     let unfolded = unfolded.map;
@@ -60,50 +47,12 @@ pub fn radial_velocity_method(
     }
     let calm = stage.wind(&nothing)?;
     stage.squares.loss = Loss::Squares;
-    let mut rest = Array2::from_elem(map.velocity_m_s.dim(), f64::NAN);
-    for (cell, residual) in stage
-        .squares
-        .cells
-        .iter()
-        .zip(stage.squares.rows(&calm.wake.to_array(), &[]).residuals)
-    {
-        rest[[cell.line, cell.gate]] = residual * cell.sigma_m_s;
-    }
-    let centre = |left: bool| {
-        let (range_m, elevation_rad) = core(map, &rest, left)?;
-        Some(options.model.position_m(range_m, elevation_rad))
-    };
-    let fits = |stage: &Stage<'_>| -> Vec<End> {
-        let (Some(left), Some(right)) = (centre(true), centre(false)) else {
-            return vec![];
-        };
-        let core_m = options
-            .core_radius_m
-            .unwrap_or(CORE_OVER_SPACING * (right.0 - left.0).abs());
-        let [left, right] = [left, right].map(|place_m| Vortex::at(place_m, 1.0, core_m));
-        let wake = Wake {
-            left,
-            right,
-            ..calm.wake
-        };
-        let kinds = [Kind::Left, Kind::Right, Kind::Both].map(|kind| End {
-            kind,
-            wake: kind.of(&wake),
-            chi2: f64::INFINITY,
-            sigmas_left: f64::INFINITY,
-            groups: stage.groups(kind),
-        });
-        stage.fine(&kinds)
-    };
-    let mut ends = fits(&stage);
-    if let (None, Some(best)) = (
-        &map.sigma_m_s,
-        ends.iter()
-            .min_by(|a, b| a.chi2.total_cmp(&b.chi2))
-            .cloned(),
-    ) {
+    let wake = wake_of_extremes(&stage, &calm.wake);
+    let mut ends = linear_fits(&stage, wake.as_ref());
+    let best = ends.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    if let Some(best) = best.filter(|_| map.sigma_m_s.is_none()).cloned() {
         stage = stage.rescaled(&best);
-        ends = fits(&stage);
+        ends = linear_fits(&stage, wake.as_ref());
     }
     let report = Report {
         stage: &stage,
@@ -129,6 +78,58 @@ pub fn radial_velocity_method(
     Ok(result)
 }
 
+/// Options of a fit of circulations and wind to a scan without motion, which is linear.
+fn of_linear_fit(options: &RetrievalOptions) -> RetrievalOptions {
+    RetrievalOptions {
+        free: FreeParameters {
+            lateral_position: Sharing::Fixed,
+            height: Sharing::Fixed,
+            core_radius: Sharing::Fixed,
+            ..options.free
+        },
+        loss: Loss::Squares,
+        movement: Movement::Frozen,
+        turbulence: None,
+        core_prior: None,
+        ..options.clone()
+    }
+}
+
+/// The wind of `calm` with a left and a right vortex at the extremes of what it leaves of the map.
+fn wake_of_extremes(stage: &Stage<'_>, calm: &Wake) -> Option<Wake> {
+    let mut rest = Array2::from_elem(stage.map.velocity_m_s.dim(), f64::NAN);
+    let residuals = stage.squares.rows(&calm.to_array(), &[]).residuals;
+    for (cell, residual) in stage.squares.cells.iter().zip(residuals) {
+        rest[[cell.line, cell.gate]] = residual * cell.sigma_m_s;
+    }
+    let left_m = centre_m(stage, &rest, true)?;
+    let right_m = centre_m(stage, &rest, false)?;
+    let core_m = stage
+        .options
+        .core_radius_m
+        .unwrap_or(CORE_OVER_SPACING * (right_m.0 - left_m.0).abs());
+    Some(Wake {
+        left: Vortex::at(left_m, 1.0, core_m),
+        right: Vortex::at(right_m, 1.0, core_m),
+        ..*calm
+    })
+}
+
+/// Circulations of one vortex and of both at the positions of a wake, and the wind.
+fn linear_fits(stage: &Stage<'_>, wake: Option<&Wake>) -> Vec<End> {
+    let Some(wake) = wake else {
+        return vec![];
+    };
+    let kinds = [Kind::Left, Kind::Right, Kind::Both].map(|kind| End {
+        kind,
+        wake: kind.of(wake),
+        chi2: f64::INFINITY,
+        sigmas_left: f64::INFINITY,
+        groups: stage.groups(kind),
+    });
+    stage.fine(&kinds)
+}
+
 /// Largest square of a difference of ordered velocities of a gate and the middle of their elevations.
 fn spread(elevation_rad: &[f64], velocity: &[f64], left: bool) -> (f64, f64) {
     // a right vortex is a left one with the velocities turned round
@@ -151,24 +152,35 @@ fn spread(elevation_rad: &[f64], velocity: &[f64], left: bool) -> (f64, f64) {
     (best.0 * best.0, best.1)
 }
 
-/// Range and elevation of a core.
-fn core(map: &ScanMap, rest: &Array2<f64>, left: bool) -> Option<(f64, f64)> {
+/// The gate and its neighbours, over which velocities are averaged.
+fn neighbours(gate: usize, gates: usize) -> Range<usize> {
+    gate.saturating_sub(GATES / 2)..(gate + GATES / 2 + 1).min(gates)
+}
+
+/// Mean of the velocities of a line over neighbouring gates.
+fn smoothed(rest: &Array2<f64>, line: usize, gate: usize) -> f64 {
+    let mut sum = 0.0;
+    let mut count = 0.0;
+    for gate in neighbours(gate, rest.ncols()) {
+        let velocity = rest[[line, gate]];
+        if velocity.is_finite() {
+            sum += velocity;
+            count += 1.0;
+        }
+    }
+    sum / count
+}
+
+/// Lateral coordinate and height \[m\] of the centre of the left or the right vortex in a map without wind.
+fn centre_m(stage: &Stage<'_>, rest: &Array2<f64>, left: bool) -> Option<(f64, f64)> {
+    let map = stage.map;
     let gates = map.range_m.len();
-    let about = |gate: usize| gate.saturating_sub(GATES / 2)..(gate + GATES / 2 + 1).min(gates);
-    let smooth = |line: usize, gate: usize| {
-        let known = about(gate)
-            .map(|gate| rest[[line, gate]])
-            .filter(|v| v.is_finite());
-        let (sum, count) = known.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
-        sum / count
-    };
-    let of = |gate: usize| {
-        let column: Vec<f64> = (0..map.elevation_rad.len())
-            .map(|line| smooth(line, gate))
-            .collect();
-        spread(&map.elevation_rad, &column, left)
-    };
-    let spreads: Vec<(f64, f64)> = (0..gates).map(of).collect();
+    let mut spreads = Vec::with_capacity(gates);
+    for gate in 0..gates {
+        let lines = 0..map.elevation_rad.len();
+        let column: Vec<f64> = lines.map(|line| smoothed(rest, line, gate)).collect();
+        spreads.push(spread(&map.elevation_rad, &column, left));
+    }
     let best = (0..gates).max_by(|a, b| spreads[*a].0.total_cmp(&spreads[*b].0))?;
     let mut range_m = map.range_m[best];
     if best > 0 && best + 1 < gates {
@@ -181,9 +193,17 @@ fn core(map: &ScanMap, rest: &Array2<f64>, left: bool) -> Option<(f64, f64)> {
         };
         range_m += part * 0.5 * (map.range_m[best + 1] - map.range_m[best - 1]);
     }
-    let weights: f64 = about(best).map(|gate| spreads[gate].0).sum();
-    let elevation: f64 = about(best)
-        .map(|gate| spreads[gate].0 * spreads[gate].1)
+    let about = neighbours(best, gates);
+    let weights: f64 = spreads[about.clone()]
+        .iter()
+        .map(|(square, _)| square)
         .sum();
-    (weights > 0.0).then(|| (range_m, elevation / weights))
+    let elevation: f64 = spreads[about]
+        .iter()
+        .map(|(square, elevation)| square * elevation)
+        .sum();
+    (weights > 0.0).then(|| {
+        let model = &stage.options.model;
+        model.position_m(range_m, elevation / weights)
+    })
 }

@@ -2,14 +2,14 @@
 //!
 //! Check: the reference maps; wakes at the end of the sector, near the ground, with a kept core.
 
-use ndarray::{Array1, Array2, Axis};
+use ndarray::{Array1, Array2};
 
 use crate::Measured;
 use crate::error::Error;
 use crate::linalg::positive_definite::solve;
 use crate::retrieval::hypotheses::{End, Kind, Stage, best, least, tops};
 use crate::retrieval::{Covariance, Flag, ScanResult, Side, VortexResult};
-use crate::vortex_fit::map_fit::least_squares::{Scores, Uncertainty};
+use crate::vortex_fit::map_fit::least_squares::{Scores, Uncertainty, submatrix};
 use crate::vortex_fit::tolerances::{CERTAIN_SIGMAS, COMPETES, NOT_CONVERGED_SIGMAS};
 use crate::vortex_fit::{Parameter, Top, Wake};
 
@@ -56,10 +56,7 @@ impl<'a> Report<'a> {
             }
             _ => 1.0,
         };
-        let gain = |without: Option<&End>, with: &End| {
-            without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2) / alike
-        };
-        let statistic = likely.map_or(0.0, |end| gain(Some(self.wind), end));
+        let statistic = likely.map_or(0.0, |end| self.gain(Some(self.wind), end, alike));
         let left = best(self.ends, Kind::Left);
         let right = best(self.ends, Kind::Right);
         let lone = [left, right]
@@ -73,25 +70,16 @@ impl<'a> Report<'a> {
         {
             let known = of_likely.take();
             let seen = match end.kind {
-                Kind::Both => gain(left, end).min(gain(right, end)),
-                _ => gain(Some(self.wind), end),
+                Kind::Both => self
+                    .gain(left, end, alike)
+                    .min(self.gain(right, end, alike)),
+                _ => self.gain(Some(self.wind), end, alike),
             };
             if seen.min(statistic) < self.stage.options.threshold {
                 continue;
             }
             let uncertainty = known.map_or_else(|| self.uncertainty(end), Ok)?;
-            let circulations = self
-                .sides(end)
-                .into_iter()
-                .map(|side| side.parameters()[0] as usize);
-            let threshold = self.stage.options.threshold;
-            let certain =
-                circulations.map(|place| uncertainty.certain(&end.wake, place, threshold));
-            if certain
-                .collect::<Result<Vec<bool>, _>>()?
-                .into_iter()
-                .all(|certain| certain)
-            {
+            if self.are_certain(end, &uncertainty)? {
                 return Ok(Chosen {
                     end,
                     covariance: uncertainty.covariance(|_| true)?,
@@ -108,6 +96,22 @@ impl<'a> Report<'a> {
         })
     }
 
+    /// Drop of chi-square from one fit to another one with more vortices, with correlated velocities counted once; infinite without the first.
+    fn gain(&self, without: Option<&End>, with: &End, alike: f64) -> f64 {
+        without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2) / alike
+    }
+
+    /// Whether the circulations of all vortices of an end are positive beyond doubt.
+    fn are_certain(&self, end: &End, uncertainty: &Uncertainty<'_>) -> Result<bool, Error> {
+        let mut are_certain = true;
+        for side in self.sides(end) {
+            let circulation = side.parameters()[0] as usize;
+            are_certain &=
+                uncertainty.certain(&end.wake, circulation, self.stage.options.threshold)?;
+        }
+        Ok(are_certain)
+    }
+
     /// Covariance \[10, 10\] of an end.
     pub(crate) fn covariance(&self, end: &End) -> Result<Array2<f64>, Error> {
         self.uncertainty(end)?.covariance(|_| true)
@@ -117,15 +121,20 @@ impl<'a> Report<'a> {
     pub(crate) fn vortices(&self, end: &End, covariance: &Array2<f64>) -> Vec<VortexResult> {
         let model = self.stage.gates.model;
         let moves = self.stage.gates.seconds.is_some();
-        let vortex = |side| {
-            VortexResult::at_its_line(self.stage.map, model, (&end.wake, covariance), side, moves)
-        };
-        self.sides(end).into_iter().map(vortex).collect()
+        let mut vortices = Vec::new();
+        for side in self.sides(end) {
+            let fitted = (&end.wake, covariance);
+            let vortex = VortexResult::at_its_line(self.stage.map, model, fitted, side, moves);
+            vortices.push(vortex);
+        }
+        vortices
     }
 
     fn sides(&self, end: &End) -> Vec<Side> {
-        let is_there = |side: &Side| end.kind.has(side.parameters()[0] as usize);
-        Side::BOTH.into_iter().filter(is_there).collect()
+        Side::BOTH
+            .into_iter()
+            .filter(|side| end.kind.has(side.parameters()[0] as usize))
+            .collect()
     }
 
     fn uncertainty<'b>(&self, end: &'b End) -> Result<Uncertainty<'b>, Error> {
@@ -190,7 +199,9 @@ impl<'a> Report<'a> {
         } else {
             2.0 * SEEN_M
         };
-        let low = |vortex: &VortexResult| vortex.height_m.value < 0.5 * spacing_m;
+        let is_near_ground = vortices
+            .iter()
+            .any(|vortex| vortex.height_m.value < 0.5 * spacing_m);
         let competes = tops
             .get(1)
             .zip(tops.first())
@@ -214,7 +225,7 @@ impl<'a> Report<'a> {
                 Flag::AtEdge,
                 vortices.iter().any(|vortex| self.margin_m(vortex) < SEEN_M),
             ),
-            (Flag::NearGround, vortices.iter().any(low)),
+            (Flag::NearGround, is_near_ground),
             (Flag::MotionIgnored, is_at_rest),
             (Flag::Ambiguous, competes),
             (Flag::PoorFit, self.scale.powi(2) > POOR),
@@ -236,14 +247,24 @@ impl<'a> Report<'a> {
             .options
             .model
             .range_and_elevation(vortex.place_m());
-        let within = |axis: &[f64], value: f64| {
-            axis.first()
-                .zip(axis.last())
-                .map_or(f64::NAN, |(first, last)| (value - first).min(last - value))
-        };
-        within(&self.stage.map.range_m, range_m)
-            .min(range_m * within(&self.stage.map.elevation_rad, elevation_rad))
+        let map = self.stage.map;
+        let margin_rad = margin(&map.elevation_rad, elevation_rad);
+        margin(&map.range_m, range_m).min(range_m * margin_rad)
     }
+}
+
+/// Distance of a value from the nearer end of an axis; negative outside, NaN for an empty axis.
+fn margin(axis: &[f64], value: f64) -> f64 {
+    axis.first()
+        .zip(axis.last())
+        .map_or(f64::NAN, |(first, last)| (value - first).min(last - value))
+}
+
+/// Product of a row of a matrix with a vector.
+fn row_product(matrix: &Array2<f64>, row: usize, vector: &[f64]) -> f64 {
+    (0..vector.len())
+        .map(|j| matrix[[row, j]] * vector[j])
+        .sum()
 }
 
 impl Uncertainty<'_> {
@@ -251,24 +272,20 @@ impl Uncertainty<'_> {
     /// is so many times larger by chance. What wind takes from the wake is left out.
     fn excess(&self, wake: &Wake, variance: f64) -> f64 {
         let p = wake.to_array();
-        let (wind, vortices): (Vec<usize>, Vec<usize>) =
-            (0..self.groups.len()).partition(|i| self.groups[*i][0] >= Parameter::Wind as usize);
-        let size = |i: &usize| {
-            if self.groups[*i][0] <= Parameter::RightCirculation as usize {
-                p[self.groups[*i][0]]
-            } else {
-                0.0
-            }
-        };
+        let mut wind = Vec::new();
         let mut along = vec![0.0; self.groups.len()];
-        vortices.iter().for_each(|i| along[*i] = size(i));
-        let times = |matrix: &Array2<f64>, i: usize| {
-            (0..along.len())
-                .map(|j| matrix[[i, j]] * along[j])
-                .sum::<f64>()
-        };
-        let towards: Vec<f64> = wind.iter().map(|i| -times(&self.curvature, *i)).collect();
-        let own = self.curvature.select(Axis(0), &wind).select(Axis(1), &wind);
+        for (i, group) in self.groups.iter().enumerate() {
+            if group[0] >= Parameter::Wind as usize {
+                wind.push(i);
+            } else if group[0] <= Parameter::RightCirculation as usize {
+                along[i] = p[group[0]];
+            }
+        }
+        let towards: Vec<f64> = wind
+            .iter()
+            .map(|i| -row_product(&self.curvature, *i, &along))
+            .collect();
+        let own = submatrix(&self.curvature, &wind);
         let taken = solve(&own, &towards).unwrap_or_else(|| vec![0.0; wind.len()]);
         wind.iter()
             .zip(taken)
@@ -284,15 +301,14 @@ impl Uncertainty<'_> {
     /// both, as far as the fit leaves them; the places are the best of many, as those of the statistic are.
     fn certain(&self, wake: &Wake, circulation: usize, threshold: f64) -> Result<bool, Error> {
         let value = wake.to_array()[circulation];
-        let beyond = |covariance: Array2<f64>, sigmas: f64| {
-            value > sigmas * covariance[[circulation; 2]].sqrt()
-        };
-        let alone =
-            |group: &[usize]| group.contains(&circulation) || group[0] >= Parameter::Wind as usize;
-        Ok(beyond(self.covariance(|_| true)?, CERTAIN_SIGMAS)
-            || beyond(
-                self.covariance(alone)?,
-                (BY_FAR * threshold.sqrt()).max(CERTAIN_SIGMAS),
-            ))
+        let of_all = self.covariance(|_| true)?;
+        if value > CERTAIN_SIGMAS * of_all[[circulation; 2]].sqrt() {
+            return Ok(true);
+        }
+        let of_wind_and_circulation = self.covariance(|group| {
+            group.contains(&circulation) || group[0] >= Parameter::Wind as usize
+        })?;
+        let sigmas = (BY_FAR * threshold.sqrt()).max(CERTAIN_SIGMAS);
+        Ok(value > sigmas * of_wind_and_circulation[[circulation; 2]].sqrt())
     }
 }

@@ -4,6 +4,7 @@ use ndarray::Array2;
 
 use crate::Measured;
 use crate::retrieval::ScanMap;
+use crate::vortex_fit::map_fit::data::nearest_index;
 use crate::vortex_fit::tolerances::{CERTAIN_SIGMAS, COMPETES};
 use crate::vortex_fit::wake::motion::Motion;
 use crate::vortex_fit::{PARAMETERS, Parameter, Top, Wake, WakeModel};
@@ -93,49 +94,63 @@ impl VortexResult {
         let [circulation, lateral, height, core] =
             side.parameters().map(|parameter| parameter as usize);
         let motion = moves.then(|| Motion::new(model, wake));
-        let after = |seconds: f64| {
-            motion
-                .as_ref()
-                .map_or(*wake, |motion| motion.wake_after(wake, seconds))
-                .to_array()
-        };
+        let motion = motion.as_ref();
         let reference_s = map.middle_s();
         let mut seconds = 0.0;
         // the line is that of the place then
         for _ in 0..4 {
-            let p = after(seconds);
+            let p = parameters_after(motion, wake, seconds);
             let (_, elevation_rad) = model.range_and_elevation((p[lateral], p[height]));
-            let away = |line: &usize| (map.elevation_rad[*line] - elevation_rad).abs();
-            let nearest = (0..map.elevation_rad.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
+            let nearest = nearest_index(&map.elevation_rad, elevation_rad);
             seconds = nearest.map_or(f64::NAN, |line| map.time_s[line] - reference_s);
         }
-        let then = after(seconds);
-        let measured = |place: usize| {
-            let mut slope = [0.0; PARAMETERS];
-            slope[place] = 1.0;
-            if let Some(motion) = &motion {
-                motion.carry_back(seconds, &mut slope);
-            }
-            let terms = covariance
-                .indexed_iter()
-                .map(|((i, j), c)| slope[i] * c * slope[j]);
-            Measured {
-                value: then[place],
-                std: terms.sum::<f64>().max(0.0).sqrt(),
-            }
-        };
+        let then = parameters_after(motion, wake, seconds);
+        let [
+            circulation_m2_s,
+            lateral_position_m,
+            height_m,
+            core_radius_m,
+        ] = [circulation, lateral, height, core].map(|parameter| Measured {
+            value: then[parameter],
+            std: std_after(motion, seconds, parameter, covariance),
+        });
         let [left, right] = wake.mean_circulations_5_15_m2_s(model.profile, covariance.view());
         let (value, std) = if side == Side::Left { left } else { right };
         Self {
             side,
             time_s: reference_s + seconds,
-            circulation_m2_s: measured(circulation),
+            circulation_m2_s,
             circulation_5_15_m2_s: Measured { value, std },
-            lateral_position_m: measured(lateral),
-            height_m: measured(height),
-            core_radius_m: (covariance[[core, core]] > 0.0).then(|| measured(core)),
+            lateral_position_m,
+            height_m,
+            core_radius_m: (covariance[[core, core]] > 0.0).then_some(core_radius_m),
         }
     }
+}
+
+/// Parameters of a wake `seconds` after its reference time; without a motion those of the reference time.
+fn parameters_after(motion: Option<&Motion>, wake: &Wake, seconds: f64) -> [f64; PARAMETERS] {
+    motion
+        .map_or(*wake, |motion| motion.wake_after(wake, seconds))
+        .to_array()
+}
+
+/// Standard deviation of a parameter `seconds` after the reference time, from the covariance \[10, 10\] at that time.
+fn std_after(
+    motion: Option<&Motion>,
+    seconds: f64,
+    parameter: usize,
+    covariance: &Array2<f64>,
+) -> f64 {
+    let mut slope = [0.0; PARAMETERS];
+    slope[parameter] = 1.0;
+    if let Some(motion) = motion {
+        motion.carry_back(seconds, &mut slope);
+    }
+    let terms = covariance
+        .indexed_iter()
+        .map(|((i, j), c)| slope[i] * c * slope[j]);
+    terms.sum::<f64>().max(0.0).sqrt()
 }
 
 /// What to think of a result.
@@ -255,15 +270,15 @@ impl ScanResult {
         tops: Vec<Top>,
         moves: bool,
     ) -> Self {
-        let is_there = |side: &Side| wake.to_array()[side.parameters()[0] as usize] != 0.0;
-        let vortex =
-            |side| VortexResult::at_its_line(map, model, (&wake, &covariance), side, moves);
+        let mut vortices = Vec::new();
+        for side in Side::BOTH {
+            if wake.to_array()[side.parameters()[0] as usize] != 0.0 {
+                let fitted = (&wake, &covariance);
+                vortices.push(VortexResult::at_its_line(map, model, fitted, side, moves));
+            }
+        }
         let mut result = Self {
-            vortices: Side::BOTH
-                .into_iter()
-                .filter(is_there)
-                .map(vortex)
-                .collect(),
+            vortices,
             wake: Some(wake),
             lateral_wind_m_s: Measured::of_wake(Parameter::Wind, &wake, &covariance),
             wind_shear_per_s: Measured::of_wake(Parameter::Shear, &wake, &covariance),
@@ -294,29 +309,30 @@ impl ScanResult {
     pub(crate) fn reporting(mut self, is_reported: impl Fn(&VortexResult) -> bool) -> Self {
         self.vortices.retain(is_reported);
         self.set(Flag::OneVortex, self.vortices.len() == 1);
-        let is_kept = |vortex: &VortexResult| vortex.core_radius_m.is_none();
-        self.set(Flag::CoreKept, self.vortices.iter().any(is_kept));
+        let mut vortices = self.vortices.iter();
+        let is_core_kept = vortices.any(|vortex| vortex.core_radius_m.is_none());
+        self.set(Flag::CoreKept, is_core_kept);
         self
     }
 
     /// Counts the distance from another result as an error, in all numbers that are known.
     pub(crate) fn add_distance_from(&mut self, other: &Self, map: &ScanMap, model: &WakeModel) {
-        let (Some(wake), Some(other)) = (self.wake, other.wake) else {
+        let Some((wake, other)) = self.wake.zip(other.wake) else {
             return;
         };
         let own = wake.to_array();
         let other = other.to_array();
         let variances = self.covariance.diag().to_owned();
-        let distance = |i: usize| {
+        let distance: [f64; PARAMETERS] = std::array::from_fn(|i| {
             if variances[i] > 0.0 {
                 own[i] - other[i]
             } else {
                 0.0
             }
-        };
+        });
         let mut covariance = self.covariance.clone();
         for ((i, j), c) in covariance.indexed_iter_mut() {
-            *c += distance(i) * distance(j);
+            *c += distance[i] * distance[j];
         }
         let moves = !self.has(Flag::MotionIgnored);
         *self = self.with_wake(map, model, (wake, covariance), self.tops.clone(), moves);

@@ -107,14 +107,14 @@ impl ScanMap {
     pub fn strided(&self, lines: usize, gates: usize) -> Self {
         let lines = lines.max(1);
         let gates = gates.max(1);
-        let axis = |all: &[f64], stride: usize| all.iter().copied().step_by(stride).collect();
-        let cells = |all: &Array2<f64>| all.slice(s![..;lines, ..;gates]).to_owned();
+        let cells = s![..;lines, ..;gates];
+        let sigma_m_s = self.sigma_m_s.as_ref();
         Self {
-            elevation_rad: axis(&self.elevation_rad, lines),
-            time_s: axis(&self.time_s, lines),
-            range_m: axis(&self.range_m, gates),
-            velocity_m_s: cells(&self.velocity_m_s),
-            sigma_m_s: self.sigma_m_s.as_ref().map(cells),
+            elevation_rad: every_nth(&self.elevation_rad, lines),
+            time_s: every_nth(&self.time_s, lines),
+            range_m: every_nth(&self.range_m, gates),
+            velocity_m_s: self.velocity_m_s.slice(cells).to_owned(),
+            sigma_m_s: sigma_m_s.map(|sigma| sigma.slice(cells).to_owned()),
             fold_m_s: self.fold_m_s,
         }
     }
@@ -173,4 +173,8 @@ impl ScanMap {
             standard_deviation_m_s: self.sigma_m_s.as_ref().map(|sigma| sigma.view()),
         }
     }
+}
+
+fn every_nth(values: &[f64], stride: usize) -> Vec<f64> {
+    values.iter().copied().step_by(stride).collect()
 }

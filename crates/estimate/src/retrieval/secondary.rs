@@ -8,8 +8,9 @@ use crate::error::Error;
 use crate::retrieval::gate_means::{MOST, fit_means};
 use crate::retrieval::{Flag, RetrievalOptions, ScanFit, ScanMap, ScanResult, VortexResult};
 use crate::vortex_fit::map_fit::gates::Gates;
+use crate::vortex_fit::map_fit::secondary::Found;
 use crate::vortex_fit::map_fit::setting::Setting;
-use crate::vortex_fit::{MapFitOptions, Parameter};
+use crate::vortex_fit::{MapFitOptions, Parameter, Wake};
 
 /// The fit with secondary vortices in the model, if the scan shows them beside the pair that was `found` or [`RetrievalOptions::secondary`] requests
 /// them; with [`Secondary::Never`](crate::vortex_fit::Secondary::Never) what was found, flagged. They are searched in velocities whose errors are
@@ -34,33 +35,7 @@ pub(super) fn with_secondary_vortices(
     };
     let moves = map.has_times() && !found.has(Flag::MotionIgnored);
     options.validate()?;
-    let map_options = MapFitOptions {
-        free: options.free,
-        core_prior: options.core_prior,
-        pair_prior: None,
-        loss: options.loss,
-        secondary: options.secondary,
-        correlated_lines: map.elevation_rad.len(),
-        ..MapFitOptions::default()
-    };
-    let unfolded = map.unfolded_about(&options.model, &pair);
-    let bounded = unfolded.medians(MOST);
-    let sought = bounded.as_ref().unwrap_or(&unfolded);
-    let gates = Gates::rough(sought, options)?;
-    let gates = Gates {
-        seconds: moves.then(|| sought.after_middle_s()),
-        shared_points: true,
-        ..gates
-    };
-    let setting = Setting {
-        map: &sought.view(),
-        model: &options.model,
-        prediction: &gates,
-        kernel: &gates.kernel,
-        options: &map_options,
-        least_core_m: 0.0,
-    };
-    let Some(four) = setting.with_secondary(&pair) else {
+    let Some(four) = search(map, options, &pair, moves)? else {
         return Ok(None);
     };
     if !four.secondary.fitted {
@@ -88,6 +63,45 @@ pub(super) fn with_secondary_vortices(
         result,
         model: options.model,
     }))
+}
+
+/// The pair with the secondary vortices that its scan, thinned if it has many velocities, shows beside it as means over gates.
+///
+/// # Errors
+/// As [`fit_scan`](crate::retrieval::fit_scan).
+fn search(
+    map: &ScanMap,
+    options: &RetrievalOptions,
+    pair: &Wake,
+    moves: bool,
+) -> Result<Option<Found>, Error> {
+    let map_options = MapFitOptions {
+        free: options.free,
+        core_prior: options.core_prior,
+        pair_prior: None,
+        loss: options.loss,
+        secondary: options.secondary,
+        correlated_lines: map.elevation_rad.len(),
+        ..MapFitOptions::default()
+    };
+    let unfolded = map.unfolded_about(&options.model, pair);
+    let bounded = unfolded.medians(MOST);
+    let sought = bounded.as_ref().unwrap_or(&unfolded);
+    let gates = Gates::rough(sought, options)?;
+    let gates = Gates {
+        seconds: moves.then(|| sought.after_middle_s()),
+        shared_points: true,
+        ..gates
+    };
+    let setting = Setting {
+        map: &sought.view(),
+        model: &options.model,
+        prediction: &gates,
+        kernel: &gates.kernel,
+        options: &map_options,
+        least_core_m: 0.0,
+    };
+    Ok(setting.with_secondary(pair))
 }
 
 /// Deviations that are too small as the secondary vortices were kept become those of the fit of all.

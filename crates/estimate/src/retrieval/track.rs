@@ -51,6 +51,20 @@ pub struct TrackedVortex {
     pub detected: bool,
 }
 
+impl TrackedVortex {
+    /// The vortex with that core radius \[m\] a time \[s\] later, at the same rates.
+    fn after(&self, seconds: f64, core_radius_m: f64) -> Vortex {
+        Vortex {
+            circulation_m2_s: self.circulation_m2_s.value
+                * (-self.decay_per_s.value * seconds).exp(),
+            lateral_position_m: self.lateral_position_m.value
+                + seconds * self.lateral_velocity_m_s.value,
+            height_m: self.height_m.value + seconds * self.vertical_velocity_m_s.value,
+            core_radius_m,
+        }
+    }
+}
+
 /// The vortices that are tracked at the time of one scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackPoint {
@@ -58,6 +72,12 @@ pub struct TrackPoint {
     pub time_s: f64,
     /// The vortices that live then.
     pub vortices: Vec<TrackedVortex>,
+}
+
+impl TrackPoint {
+    fn vortex(&self, side: Side) -> Option<&TrackedVortex> {
+        self.vortices.iter().find(|vortex| vortex.side == side)
+    }
 }
 
 /// A track.
@@ -80,18 +100,8 @@ impl Track {
     pub fn prediction(&self, time_s: f64, core_radius_m: f64) -> Option<Wake> {
         let last = self.points.last()?;
         let seconds = time_s - last.time_s;
-        let vortex = |side: Side| {
-            let v = last.vortices.iter().find(|vortex| vortex.side == side)?;
-            Some(Vortex {
-                circulation_m2_s: v.circulation_m2_s.value * (-v.decay_per_s.value * seconds).exp(),
-                lateral_position_m: v.lateral_position_m.value
-                    + seconds * v.lateral_velocity_m_s.value,
-                height_m: v.height_m.value + seconds * v.vertical_velocity_m_s.value,
-                core_radius_m,
-            })
-        };
-        let left = vortex(Side::Left)?;
-        let right = vortex(Side::Right)?;
+        let left = last.vortex(Side::Left)?.after(seconds, core_radius_m);
+        let right = last.vortex(Side::Right)?.after(seconds, core_radius_m);
         let wake = Wake::calm(left, right);
         wake.validate().is_ok().then_some(wake)
     }
@@ -102,6 +112,16 @@ impl Track {
 struct State {
     mean: Array1<f64>,
     covariance: Array2<f64>,
+}
+
+impl State {
+    /// An element of the state with its standard deviation.
+    fn element(&self, index: usize) -> Measured {
+        Measured {
+            value: self.mean[index],
+            std: self.covariance[[index; 2]].max(0.0).sqrt(),
+        }
+    }
 }
 
 /// One scan of the filter.
@@ -163,23 +183,20 @@ pub fn track(results: &[&ScanResult], acceleration_density_m2_s3: f64) -> Result
 }
 
 fn tracked(state: &State, i: usize, detected: bool) -> TrackedVortex {
-    let number = |place: usize| Measured {
-        value: state.mean[ONE * i + place],
-        std: state.covariance[[ONE * i + place; 2]].max(0.0).sqrt(),
-    };
-    let circulation = number(4);
-    let value = circulation.value.exp();
+    let first = ONE * i;
+    let log_circulation = state.element(first + 4);
+    let value = log_circulation.value.exp();
     TrackedVortex {
         side: Side::BOTH[i],
-        lateral_position_m: number(0),
-        lateral_velocity_m_s: number(1),
-        height_m: number(2),
-        vertical_velocity_m_s: number(3),
+        lateral_position_m: state.element(first),
+        lateral_velocity_m_s: state.element(first + 1),
+        height_m: state.element(first + 2),
+        vertical_velocity_m_s: state.element(first + 3),
         circulation_m2_s: Measured {
             value,
-            std: value * circulation.std,
+            std: value * log_circulation.std,
         },
-        decay_per_s: number(5),
+        decay_per_s: state.element(first + 5),
         detected,
     }
 }
@@ -224,6 +241,7 @@ impl Filter {
         (transition, State { mean, covariance })
     }
 
+    /// Adds the scan that is `seconds` after the last one; `soon` are those after it within which a birth needs a second detection.
     fn step(
         &mut self,
         result: &ScanResult,
@@ -242,37 +260,22 @@ impl Filter {
         let mut taken = [None; 2];
         let mut lost = [false; 2];
         for (i, side) in Side::BOTH.into_iter().enumerate() {
-            let seen = result
+            let observed = result
                 .vortex(side)
                 .filter(|vortex| vortex.circulation_m2_s.value > 0.0);
-            if let (false, Some(vortex)) = (alive[i], seen) {
-                if soon.iter().any(|next| next.vortex(side).is_some()) {
-                    Self::born(&mut predicted, i, vortex);
-                    alive[i] = true;
-                    self.misses[i] = 0;
-                    taken[i] = Some(vortex);
-                }
+            if alive[i] {
+                taken[i] = self.associated(&predicted, result, i, observed)?;
+                let height_m = predicted.mean[ONE * i + 2];
+                lost[i] = self.misses[i] >= DEATH || (height_m < 0.0 && taken[i].is_none());
                 continue;
             }
-            if !alive[i] {
-                continue;
+            let is_confirmed = soon.iter().any(|next| next.vortex(side).is_some());
+            if let Some(vortex) = observed.filter(|_| is_confirmed) {
+                Self::born(&mut predicted, i, vortex);
+                alive[i] = true;
+                self.misses[i] = 0;
+                taken[i] = Some(vortex);
             }
-            let distance = seen
-                .map(|v| Self::innovation(&predicted, result, &[(i, v)]))
-                .transpose()?;
-            match (seen, distance) {
-                (Some(vortex), Some((distance, _))) if distance < GATE => {
-                    taken[i] = Some(vortex);
-                    self.innovations.push(distance);
-                    self.misses[i] = 0;
-                }
-                _ => {
-                    self.rejected += usize::from(seen.is_some());
-                    self.misses[i] += 1;
-                }
-            }
-            let height_m = predicted.mean[ONE * i + 2];
-            lost[i] = self.misses[i] >= DEATH || (height_m < 0.0 && taken[i].is_none());
         }
         let pairs: Vec<(usize, &VortexResult)> = taken
             .iter()
@@ -284,17 +287,9 @@ impl Filter {
         } else {
             Self::innovation(&predicted, result, &pairs)?.1
         };
-        for i in 0..2 {
-            if lost[i] {
-                alive[i] = false;
-                // it ended with its last detection
-                let undetected = self
-                    .steps
-                    .iter_mut()
-                    .rev()
-                    .take_while(|step| step.alive[i] && !step.detected[i]);
-                undetected.for_each(|step| step.alive[i] = false);
-            }
+        for i in (0..2).filter(|i| lost[*i]) {
+            alive[i] = false;
+            self.end_with_last_detection(i);
         }
         let detected = taken.map(|vortex| vortex.is_some());
         self.steps.push(Step {
@@ -305,6 +300,37 @@ impl Filter {
             detected,
         });
         Ok(())
+    }
+
+    /// The observed vortex if its normalised innovation is small enough, else a miss of the vortex that lives.
+    fn associated<'v>(
+        &mut self,
+        predicted: &State,
+        result: &ScanResult,
+        i: usize,
+        observed: Option<&'v VortexResult>,
+    ) -> Result<Option<&'v VortexResult>, Error> {
+        if let Some(vortex) = observed {
+            let (distance, _) = Self::innovation(predicted, result, &[(i, vortex)])?;
+            if distance < GATE {
+                self.innovations.push(distance);
+                self.misses[i] = 0;
+                return Ok(Some(vortex));
+            }
+            self.rejected += 1;
+        }
+        self.misses[i] += 1;
+        Ok(None)
+    }
+
+    /// Removes a vortex from the scans since its last detection.
+    fn end_with_last_detection(&mut self, i: usize) {
+        for step in self.steps.iter_mut().rev() {
+            if !step.alive[i] || step.detected[i] {
+                break;
+            }
+            step.alive[i] = false;
+        }
     }
 
     /// A vortex begins where it is seen, with rates that are unknown.
@@ -326,15 +352,15 @@ impl Filter {
 
     /// y, z and ln Gamma with their standard deviations.
     fn measured(vortex: &VortexResult) -> [(f64, f64); 3] {
-        let place = |m: Measured| (m.value, if m.std > 0.0 { m.std } else { UNSTATED_M });
         let circulation = vortex.circulation_m2_s;
         let part = circulation.std / circulation.value;
         let log = (circulation.value.ln(), if part > 0.0 { part } else { 0.1 });
-        [
-            place(vortex.lateral_position_m),
-            place(vortex.height_m),
-            log,
-        ]
+        let [lateral, height] = [vortex.lateral_position_m, vortex.height_m].map(|position| {
+            let is_stated = position.std > 0.0;
+            let std_m = if is_stated { position.std } else { UNSTATED_M };
+            (position.value, std_m)
+        });
+        [lateral, height, log]
     }
 
     /// Normalised innovation of the vortices of a scan, and the state with them.
