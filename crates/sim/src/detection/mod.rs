@@ -150,20 +150,15 @@ impl Calibration {
         settings: &DetectionSettings,
         observer: &dyn Observer,
     ) -> Result<Self, Error> {
-        let with = |map: &ScanMap, options| {
-            WakeDetector::new(map, &settings.model, &settings.gate, &options)
-        };
         let mut map = map.clone();
         let mut assumed_sigma_m_s = None;
         if map.sigma_m_s.is_none() {
             map.sigma_m_s = Some(ndarray::Array2::ones(map.velocity_m_s.raw_dim()));
-            let unit = with(
-                &map,
-                DetectorOptions {
-                    turbulence: None,
-                    ..settings.options
-                },
-            )?;
+            let calm = DetectorOptions {
+                turbulence: None,
+                ..settings.options
+            };
+            let unit = WakeDetector::new(&map, &settings.model, &settings.gate, &calm)?;
             let all = unit.statistic(map.velocity_m_s.view())?.wake_chi2_per_dof;
             let air = settings
                 .options
@@ -177,7 +172,7 @@ impl Calibration {
             ));
             assumed_sigma_m_s = Some(sigma_m_s);
         }
-        let detector = with(&map, settings.options)?;
+        let detector = WakeDetector::new(&map, &settings.model, &settings.gate, &settings.options)?;
         observer.begin(Stage::Detection, settings.empty_scans as u64);
         let law = detector.calibrate(settings.empty_scans, |scan| {
             observer.advance(1);
@@ -201,20 +196,24 @@ impl Calibration {
         if !same_axes || map.sigma_m_s.is_none() != self.assumed_sigma_m_s.is_some() {
             return false;
         }
-        let sigma = |of: &ScanMap, at: (usize, usize)| {
-            of.sigma_m_s.as_ref().map_or(f64::NAN, |sigma| sigma[at])
-        };
-        let is_other =
-            |at: &(usize, usize)| (sigma(map, *at) / sigma(&self.map, *at) - 1.0).abs() > 0.1;
-        let known = |of: &ScanMap, at: (usize, usize)| of.velocity_m_s[at].is_finite();
-        let cells = map.velocity_m_s.indexed_iter().map(|(at, _)| at);
-        let (both, rest): (Vec<_>, Vec<_>) =
-            cells.partition(|at| known(map, *at) && known(&self.map, *at));
-        let one = rest
-            .into_iter()
-            .filter(|at| known(map, *at) || known(&self.map, *at))
-            .count();
-        10 * one < both.len() && !both.iter().any(is_other)
+        let mut both = 0;
+        let mut one = 0;
+        for (at, velocity_m_s) in map.velocity_m_s.indexed_iter() {
+            match (
+                velocity_m_s.is_finite(),
+                self.map.velocity_m_s[at].is_finite(),
+            ) {
+                (true, true) => {
+                    both += 1;
+                    if (sigma_at(map, at) / sigma_at(&self.map, at) - 1.0).abs() > 0.1 {
+                        return false;
+                    }
+                }
+                (false, false) => {}
+                _ => one += 1,
+            }
+        }
+        10 * one < both
     }
 
     /// Tests a scan that the calibration is for.
@@ -266,9 +265,10 @@ impl Calibration {
         let std_m2_s = trials.circulation_std_m2_s();
         let circulations: Vec<f64> = (0..=20).map(|i| 0.5 * f64::from(i) * std_m2_s).collect();
         let shares = trials.detection(&circulations, self.threshold);
-        let at_rate =
-            |(circulation, share)| (circulation, settings.false_alarm, self.threshold, share);
-        let found = circulations.into_iter().zip(shares).map(at_rate).collect();
+        let found = circulations.into_iter().zip(shares);
+        let found = found
+            .map(|(circulation, share)| (circulation, settings.false_alarm, self.threshold, share))
+            .collect();
         // four rates in a decade
         let rates: Vec<f64> = (-16..0).map(|i| 10f64.powf(0.25 * f64::from(i))).collect();
         let mut roc = Vec::new();
@@ -301,6 +301,11 @@ impl Calibration {
             smallest_error_m2_s,
         })
     }
+}
+
+/// Standard deviation of a velocity of a map, NaN where none is stated.
+fn sigma_at(map: &ScanMap, at: (usize, usize)) -> f64 {
+    map.sigma_m_s.as_ref().map_or(f64::NAN, |sigma| sigma[at])
 }
 
 /// Tests scans one after the other; those that are alike share a calibration. Returns the first calibration, too.

@@ -7,6 +7,7 @@
 //! among them; regions that overlap are told.
 
 use crate::Error;
+use crate::interpolation::interpolate;
 use crate::measure::map::velocities;
 use crate::plan::{Plan, Target};
 use crate::progress::Observer;
@@ -73,55 +74,37 @@ impl SceneNoise {
     fn of_maps(range_m: Vec<f64>, maps: &[Array2<f64>], scan_lines: usize) -> Self {
         let (lines, gates) = maps.first().map_or((1, 1), Array2::dim);
         let white = whitened(maps, &deviations(maps, 0));
-        let correlation = |lines: usize, gates: usize| {
-            let products = white.iter().flat_map(|map| {
-                let far = [map.nrows() - lines, map.ncols() - gates];
-                let near = [lines, gates];
-                (&map.slice(s![near[0].., near[1]..]) * &map.slice(s![..far[0], ..far[1]]))
-                    .into_iter()
-            });
-            mean(products)
-        };
-        let power = correlation(0, 0);
+        let power = mean_product(&white, 0, 0);
         let across: Vec<f64> = (0..(lines / 2).max(2))
-            .map(|k| correlation(k, 0) / power)
+            .map(|k| mean_product(&white, k, 0) / power)
             .collect();
         let along: Vec<f64> = (0..(gates / 2).max(2))
-            .map(|k| correlation(0, k) / power)
+            .map(|k| mean_product(&white, 0, k) / power)
             .collect();
-        let apart =
-            |of: &[f64], limit: f64| (1..of.len()).find(|&k| of[k] < limit).unwrap_or(of.len());
-        let mut strides = INDEPENDENT
-            .map(|limit| (apart(&across, limit), apart(&along, limit)))
-            .into_iter();
-        let leaves =
-            |stride: &(usize, usize)| scan_lines.div_ceil(stride.0) * gates.div_ceil(stride.1);
+        let strides = INDEPENDENT.map(|limit| {
+            let lines = first_below(&across, limit);
+            (lines, first_below(&along, limit))
+        });
         let stride = strides
-            .find(|stride| leaves(stride) >= NEEDED)
+            .into_iter()
+            .find(|stride| scan_lines.div_ceil(stride.0) * gates.div_ceil(stride.1) >= NEEDED)
             .unwrap_or((1, 1));
-        // on both sides of each, as far as they are alike; none where there is no velocity so far away
-        let left = |of: &[f64], stride: usize| {
-            let alike = of
-                .iter()
-                .skip(stride)
-                .step_by(stride)
-                .take_while(|c| **c > 0.0);
-            1.0 + 2.0 * alike.sum::<f64>()
-        };
-        let excess = left(&across, stride.0) * left(&along, stride.1);
+        let excess = variance_factor(&across, stride.0) * variance_factor(&along, stride.1);
         // velocities are alike over as many lines as a region has, half of which are near the end
         let ends = stride.0.min(lines / 4);
         let sigma_m_s = deviations(maps, ends);
         let white = whitened(maps, &sigma_m_s);
-        let outer = |line: usize| {
-            let both = |map: &Array2<f64>| {
-                [map.row(line).to_vec(), map.row(lines - 1 - line).to_vec()].concat()
-            };
-            mean(white.iter().flat_map(both).map(|v| v * v)).sqrt()
-        };
+        let mut outer = Vec::with_capacity(ends);
+        for line in 0..ends {
+            let both = white.iter().flat_map(|map| {
+                let first = map.row(line).into_iter();
+                first.chain(map.row(lines - 1 - line))
+            });
+            outer.push(mean(both.map(|v| v * v)).sqrt());
+        }
         Self {
             range_m,
-            outer: (0..ends).map(outer).collect(),
+            outer,
             sigma_m_s,
             stride,
             excess,
@@ -131,24 +114,17 @@ impl SceneNoise {
     /// Deviations, by range and line, of a map that is the mean of so many `scans`, where it states none or smaller ones: those that
     /// a few scans show of themselves are often far too small. They are those of velocities in sums, with [`excess`](Self::excess).
     pub fn give(&self, map: &mut ScanMap, scans: f64) {
-        let at = |range_m: f64| {
-            crate::interpolation::interpolate(&self.range_m, &self.sigma_m_s, range_m)
-        };
-        let least_m_s: Vec<f64> = map
-            .range_m
-            .iter()
-            .map(|r| at(*r) * (self.excess / scans.max(1.0)).sqrt())
-            .collect();
+        let mut least_m_s = Vec::with_capacity(map.range_m.len());
+        for range_m in &map.range_m {
+            let sigma_m_s = interpolate(&self.range_m, &self.sigma_m_s, *range_m);
+            least_m_s.push(sigma_m_s * (self.excess / scans.max(1.0)).sqrt());
+        }
         let shape = map.velocity_m_s.raw_dim();
-        let outer = |line: usize| {
-            self.outer
-                .get(line.min(shape[0] - 1 - line))
-                .copied()
-                .unwrap_or(1.0)
-        };
         let stated = map.sigma_m_s.take().unwrap_or_else(|| Array2::zeros(shape));
         map.sigma_m_s = Some(Array2::from_shape_fn(shape, |at| {
-            stated[at].max(outer(at.0) * least_m_s[at.1])
+            let from_end = at.0.min(shape[0] - 1 - at.0);
+            let outer = self.outer.get(from_end).copied().unwrap_or(1.0);
+            stated[at].max(outer * least_m_s[at.1])
         }));
     }
 
@@ -169,6 +145,29 @@ impl SceneNoise {
     }
 }
 
+/// Mean product of white velocities that are so many lines and gates apart.
+fn mean_product(white: &[Array2<f64>], lines: usize, gates: usize) -> f64 {
+    mean(white.iter().flat_map(|map| {
+        let near = map.slice(s![..map.nrows() - lines, ..map.ncols() - gates]);
+        (&map.slice(s![lines.., gates..]) * &near).into_iter()
+    }))
+}
+
+/// First distance at which a correlation is below a limit; the number of distances if it is nowhere.
+fn first_below(correlation: &[f64], limit: f64) -> usize {
+    let mut distances = 1..correlation.len();
+    let first = distances.find(|&k| correlation[k] < limit);
+    first.unwrap_or(correlation.len())
+}
+
+/// Variance of the mean of velocities a stride apart over that of independent ones: the sum of their correlations on both sides of each, as far
+/// as these are positive; 1 where there is no velocity so far away.
+fn variance_factor(correlation: &[f64], stride: usize) -> f64 {
+    let neighbours = correlation.iter().skip(stride).step_by(stride);
+    let alike: f64 = neighbours.take_while(|c| **c > 0.0).sum();
+    1.0 + 2.0 * alike
+}
+
 /// Mean of what is not NaN.
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values
@@ -180,32 +179,33 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 /// Root mean square at each gate, without so many lines at both ends and without outliers, which the median tells.
 fn deviations(maps: &[Array2<f64>], ends: usize) -> Vec<f64> {
     let gates = maps.first().map_or(0, Array2::ncols);
-    let of_gate = |gate: usize| {
-        let inner = |map: &Array2<f64>| map.slice(s![ends..map.nrows() - ends, gate]).to_vec();
-        let mut sizes: Vec<f64> = maps
-            .iter()
-            .flat_map(inner)
-            .filter(|v| v.is_finite())
-            .map(f64::abs)
-            .collect();
+    let mut deviations = Vec::with_capacity(gates);
+    for gate in 0..gates {
+        let mut sizes = Vec::new();
+        for map in maps {
+            let inner = map.slice(s![ends..map.nrows() - ends, gate]);
+            sizes.extend(inner.iter().filter(|v| v.is_finite()).map(|v| v.abs()));
+        }
         sizes.sort_by(f64::total_cmp);
         let far = sizes
             .get(sizes.len() / 2)
             .map_or(f64::NAN, |median| FAR * median / NORMAL_MEDIAN);
-        mean(sizes.into_iter().filter(|v| *v < far).map(|v| v * v)).sqrt()
-    };
-    (0..gates).map(of_gate).collect()
+        let squares = sizes.into_iter().filter(|v| *v < far).map(|v| v * v);
+        deviations.push(mean(squares).sqrt());
+    }
+    deviations
 }
 
 /// Velocities over the deviations of their gates; NaN for outliers, which say nothing of the others.
 fn whitened(maps: &[Array2<f64>], sigma_m_s: &[f64]) -> Vec<Array2<f64>> {
-    let of_map = |map: &Array2<f64>| {
-        Array2::from_shape_fn(map.raw_dim(), |at| {
+    let mut white = Vec::with_capacity(maps.len());
+    for map in maps {
+        white.push(Array2::from_shape_fn(map.raw_dim(), |at| {
             let white = map[at] / sigma_m_s[at.1];
             if white.abs() < FAR { white } else { f64::NAN }
-        })
-    };
-    maps.iter().map(of_map).collect()
+        }));
+    }
+    white
 }
 
 #[cfg(test)]

@@ -101,21 +101,24 @@ impl<'p> Retrieval<'p> {
         let g = &self.plan.geometry;
         let time_s = 0.5 * (self.plan.wind.start_s + self.plan.scan_end_s());
         let centres = vortex_pair(&self.pair).centres(time_s);
-        let vortex = |lateral_position_m: f64| Vortex {
+        let lateral_positions_m = [centres.left_y_m, centres.right_y_m];
+        let [left, right] = lateral_positions_m.map(|lateral_position_m| Vortex {
             circulation_m2_s: self.pair.circulation_m2_s,
             lateral_position_m,
             height_m: centres.height_m,
             core_radius_m: self.pair.core_radius_m,
-        };
-        let [left, right] = [centres.left_y_m, centres.right_y_m].map(vortex);
+        });
         let truth = Wake {
             left,
             right,
             lateral_wind_m_s: self.pair.cross_wind_m_s,
             wind_shear_per_s: 0.0,
         };
-        let rays = |line: &f64| std::iter::repeat_n(*line, scene.scan.pulses_per_line);
-        let elevation_rad = g.elevation_rad.iter().flat_map(rays).collect();
+        let pulses = scene.scan.pulses_per_line;
+        let lines = g.elevation_rad.iter();
+        let elevation_rad = lines
+            .flat_map(|line| std::iter::repeat_n(*line, pulses))
+            .collect();
         let setup = self.response.setup(self.model(), elevation_rad)?;
         let model = ScanModel::new(&setup, |range_m, _| self.response.snr_at(range_m), &truth)?;
         let bound = model.bound(&truth, Powers::default(), &free(), true)?;
