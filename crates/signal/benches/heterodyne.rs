@@ -4,7 +4,8 @@
 
 use std::hint::black_box;
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use ndarray::Array2;
 use num_complex::Complex;
 use rand::SeedableRng;
@@ -14,7 +15,7 @@ use wakescope_signal::sampled::SampledPulse;
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
     AccumulatedProducts, Error, GaussianPulse, LineOfSight, NoiseModel, Pulse, Receiver, Record,
-    SPEED_OF_LIGHT_M_S, Scan, Scratch, Shot, Simulator,
+    SPEED_OF_LIGHT_M_S, Sample, Scan, Scratch, Shot, Simulator,
 };
 
 const SAMPLES: usize = 1000;
@@ -164,25 +165,44 @@ fn scan(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The products of 4000 pulses of 401 samples up to the lag 63, and what is prepared once a line.
+/// The products of 4000 pulses up to the lag 63, what is prepared once a line, and a record: from
+/// these follows how many pulses of a line make the products the cheaper.
 fn products(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("accumulated products");
-    group.sample_size(20);
-    let samples = 401;
-    for noise in [NoiseModel::BandLimited, NoiseModel::White] {
+    group.sample_size(10);
+    for samples in [100, 200, 401, 800] {
+        let noise = NoiseModel::BandLimited;
         let simulator = simulator(noise, GaussianPulse::table2(), samples).expect("valid settings");
         let line = line(1);
-        group.bench_function(format!("prepare a line, {noise:?}"), |bench| {
-            bench.iter(|| AccumulatedProducts::<f64>::new(&simulator, &line));
-        });
-        let products = AccumulatedProducts::<f64>::new(&simulator, &line).expect("a covariance");
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-        let mut drawn_a2 = Array2::zeros((samples, 64));
-        group.bench_function(format!("draw a line, {noise:?}"), |bench| {
-            bench.iter(|| products.draw_into(4000, &mut rng, &mut drawn_a2));
+        let mut scratch = Scratch::default();
+        let mut record_a = vec![0.0; samples];
+        group.bench_function(format!("record of {samples} samples"), |bench| {
+            bench.iter(|| simulator.record_into(&line, &mut rng, &mut scratch, &mut record_a));
         });
+        let real = format!("{samples} real samples");
+        let complex = format!("{samples} complex samples");
+        prepare_and_draw::<f64>(&mut group, &real, &simulator, &line);
+        prepare_and_draw::<Complex<f64>>(&mut group, &complex, &simulator, &line);
     }
     group.finish();
+}
+
+fn prepare_and_draw<T: Sample>(
+    group: &mut BenchmarkGroup<'_, WallTime>,
+    samples: &str,
+    simulator: &Simulator,
+    line: &LineOfSight,
+) {
+    group.bench_function(format!("prepare a line, {samples}"), |bench| {
+        bench.iter(|| AccumulatedProducts::<T>::new(simulator, line));
+    });
+    let products = AccumulatedProducts::<T>::new(simulator, line).expect("a covariance");
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut drawn_a2 = Array2::zeros((products.samples(), 64));
+    group.bench_function(format!("draw a line, {samples}"), |bench| {
+        bench.iter(|| products.draw_into(4000, &mut rng, &mut drawn_a2));
+    });
 }
 
 criterion_group!(benches, heterodyne, scan, products);

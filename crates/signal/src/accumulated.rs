@@ -96,7 +96,7 @@ impl<T: Sample> AccumulatedProducts<T> {
     /// the record ends before k + lag. As many columns, as many lags.
     ///
     /// The random numbers that it takes depend on the number of records; one stream gives one
-    /// result, whatever the number of lags.
+    /// result, bit for bit, whatever the number of lags.
     ///
     /// # Errors
     /// [`Error::LengthMismatch`] unless `out_a2` has one row for each sample.
@@ -206,7 +206,8 @@ fn times_triangle<T: Sample>(factor: ArrayView2<'_, T>, triangle: ArrayView2<'_,
     product
 }
 
-/// `sum_c M_(k+lag,c) M_(k,c)*` for each lag, block by block.
+/// `sum_c M_(k+lag,c) M_(k,c)*` for each lag, block by block; blocks lie where they do for any
+/// number of lags, so that an element has the same bits in all of them.
 fn sum_lags<T: Sample>(product: ArrayView2<'_, T>, out: &mut Array2<T>) {
     let samples = product.nrows();
     let lags = out.ncols();
@@ -214,10 +215,15 @@ fn sum_lags<T: Sample>(product: ArrayView2<'_, T>, out: &mut Array2<T>) {
         let end = (start + BLOCK).min(samples);
         let last = (end + lags).min(samples + 1) - 1;
         let conjugate = product.slice(s![start..end, ..]).mapv(ComplexFloat::conj);
-        let sums = product.slice(s![start..last, ..]).dot(&conjugate.t());
-        for k in start..end {
-            for lag in 0..lags.min(samples - k) {
-                out[(k, lag)] = sums[(k + lag - start, k - start)];
+        for ahead in (start..last).step_by(BLOCK) {
+            let ahead_end = (ahead + BLOCK).min(samples);
+            let sums = product.slice(s![ahead..ahead_end, ..]).dot(&conjugate.t());
+            for ((row, column), sum) in sums.indexed_iter() {
+                let k = start + column;
+                let sample = ahead + row;
+                if sample >= k && sample - k < lags {
+                    out[(k, sample - k)] = *sum;
+                }
             }
         }
     }

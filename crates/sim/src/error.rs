@@ -91,6 +91,18 @@ pub enum Error {
     /// The signal simulation refused its input.
     #[error("signal: {0}")]
     Signal(#[from] wakescope_signal::Error),
+    /// The products of the samples of a line cannot be drawn.
+    #[error(
+        "line {line} at elevation {elevation_rad:.6} rad: {source}: scan.accumulation = \"records\" simulates every record"
+    )]
+    OfLine {
+        /// Index of the line, from 0.
+        line: usize,
+        /// Its elevation, rad.
+        elevation_rad: f64,
+        /// What is wrong with its records.
+        source: wakescope_signal::Error,
+    },
     /// A scene without noise has no bound.
     #[error(
         "detector.noise = \"none\": without noise nothing bounds the velocity; \"band\" or \"white\" is needed"

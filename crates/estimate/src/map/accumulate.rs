@@ -82,6 +82,8 @@ pub struct Scan {
     counts: Vec<usize>,
     /// Validity of the windows held of the rays with one that is not.
     invalid: BTreeMap<usize, Vec<bool>>,
+    /// Whether the rays of a line were added together, without a missing sample.
+    of_products: bool,
     scale: f64,
 }
 
@@ -209,6 +211,10 @@ impl Scan {
         for chord in self.chords(point, radius_m) {
             level += self.valid(chord);
             let whole = correlation.pair_sum(chord.gates());
+            if self.of_products {
+                pairs += self.geometry.rays.count(chord.line) as f64 * whole;
+                continue;
+            }
             for ray in self.geometry.line_rays(chord.line) {
                 pairs += match self.invalid.get(&ray) {
                     None => whole,

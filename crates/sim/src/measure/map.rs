@@ -1,12 +1,14 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
 use crate::Error;
+use crate::measure::accumulation::{Pulses, lags_per_window, of_pulses};
 use crate::measure::error_law::{ErrorLaw, ScanErrors, shared_cells};
 use crate::measure::gate_estimates::GateSums;
-use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints};
+use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints, WindowSums};
 use crate::measure::ray_information::range_filter;
 use crate::measure::region::places;
 use crate::measure::scan::Scanner;
+use crate::measure::scan::products::LineDraws;
 use crate::plan::line_wind::{radial_velocity_m_s, weighted_at_gates_m_s};
 use crate::plan::{Plan, Stage};
 use crate::progress::Observer;
@@ -220,27 +222,50 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::Sample>(
     seen: impl FnMut(usize, &Array2<f64>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let kept_realisations = plans.first().map_or(0, |plan| plan.kept_realisations());
-    let simulated = |realisation: usize, add: AddRecords<'_, S>| {
+    if plans.iter().all(|plan| of_pulses(plan) == Pulses::Drawn) {
+        let realisations = plans.first().map_or(0, |plan| plan.realisations());
+        let lags = plans.iter().map(|plan| lags_per_window(plan)).max();
+        let draws = LineDraws::<S>::new(scanner, lags.unwrap_or(0), realisations)?;
+        let drawn = |realisation: usize, sums: &mut [WindowSums<'_, S>]| {
+            draws.in_pieces(realisation, observer, |first_line, products| {
+                Ok(sums
+                    .iter_mut()
+                    .try_for_each(|sums| sums.add_products(first_line, products))?)
+            })?;
+            Ok(Clipped::default())
+        };
+        return of_sums(plans, scanner, observer, drawn, seen);
+    }
+    let simulated = |realisation: usize, sums: &mut [WindowSums<'_, S>]| {
         scanner.in_pieces(realisation, observer, |first, records| {
             if realisation < kept_realisations {
                 kept(records);
             }
-            add(first, records)
+            add_records(sums, first, records)
         })
     };
-    of_records(plans, scanner, observer, simulated, seen)
+    of_sums(plans, scanner, observer, simulated, seen)
 }
 
-/// What takes the records of pulses from a number on.
-pub(crate) type AddRecords<'a, S> =
-    &'a mut dyn FnMut(usize, ArrayView2<'_, S>) -> Result<(), Error>;
+/// Adds the records of pulses from a number on to the sums of every plan.
+pub(crate) fn add_records<S: Sample>(
+    sums: &mut [WindowSums<'_, S>],
+    first: usize,
+    records: ArrayView2<'_, S>,
+) -> Result<(), Error> {
+    for sums in sums {
+        sums.add(first, records)?;
+    }
+    Ok(())
+}
 
-/// The same of records that `read` hands over for each realisation, piece after piece; it says how many samples were clipped.
-pub(crate) fn of_records<S: Sample>(
+/// The same of sums over windows, one of each plan, to which `add` adds all pulses of a realisation; it returns how many samples were
+/// clipped.
+pub(crate) fn of_sums<S: Sample>(
     plans: &[&Plan],
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
-    mut read: impl FnMut(usize, AddRecords<'_, S>) -> Result<Clipped, Error>,
+    mut add: impl FnMut(usize, &mut [WindowSums<'_, S>]) -> Result<Clipped, Error>,
     mut seen: impl FnMut(usize, &Array2<f64>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let Some(plan) = plans.first() else {
@@ -260,11 +285,7 @@ pub(crate) fn of_records<S: Sample>(
             .iter()
             .map(|mapper| mapper.estimator.sums(mapper.places.clone(), None));
         let mut sums = sums.collect::<Result<Vec<_>, _>>()?;
-        clipped += read(realisation, &mut |first, records| {
-            Ok(sums
-                .iter_mut()
-                .try_for_each(|sums| sums.add(first, records))?)
-        })?;
+        clipped += add(realisation, &mut sums)?;
         let scans: Vec<Scan> = sums.into_iter().map(ScanSums::finish).collect();
         for (i, (mapper, scan)) in mappers.iter_mut().zip(&scans).enumerate() {
             seen(i, &mapper.add(scan)?);

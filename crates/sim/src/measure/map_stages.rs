@@ -1,6 +1,7 @@
 //! The stages of the map: estimates and their errors; what each needs.
 
 use crate::Error;
+use crate::measure::accumulation::{Pulses, lags_per_window, of_pulses};
 use crate::measure::region;
 use crate::measure::scan_stages::{scan_bytes, wind_bytes};
 use crate::plan::{Plan, PlannedStage, Stage};
@@ -68,9 +69,7 @@ fn windows_per_record(plan: &Plan) -> f64 {
 
 /// Real numbers that are kept of a window.
 fn numbers_per_window(plan: &Plan) -> f64 {
-    let e = &plan.scene().estimator;
-    let lags = e.few_lags().unwrap_or(e.window_samples);
-    plan.counts.parts * lags as f64
+    plan.counts.parts * lags_per_window(plan) as f64
 }
 
 /// Frequencies among which the peak of a spectrum is looked for.
@@ -165,11 +164,12 @@ fn estimates_s(plan: &Plan) -> f64 {
     };
     let planned_s = 4e-8 * (method.covariances() * window.powi(3) + bounded);
     let pictures_s = 0.25 * f64::from(u8::from(scene.outputs.svg) + u8::from(scene.outputs.png));
-    n.realisations * n.records * windows_per_record(plan) * window_s
-        + points_s
-        + planned_s
-        + n.cells * 3e-6
-        + pictures_s
+    let windows = n.realisations * windows_per_record(plan);
+    let windows_s = match of_pulses(plan) {
+        Pulses::Drawn => windows * n.lines * numbers * window * 1e-9,
+        Pulses::Records(_) => windows * n.records * window_s,
+    };
+    windows_s + points_s + planned_s + n.cells * 3e-6 + pictures_s
 }
 
 /// Gates without a window: windows may be farther apart than regions are wide. Regions as large as

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`profile`], `screens` | efficiency and signal-to-noise ratio against range; its phase screens |
 //! | [`scan`], `scan_stages` | the records of the lines of sight; what they need |
+//! | `accumulation` | whether the products of a line are summed over records or drawn at once |
 //! | [`beam_winds`] | winds from the beams of VAD and DBS scans |
 //! | [`map`], `map_stages`, `map_estimator`, `gate_estimates` | estimates and their errors against the truth; what they need |
 //! | [`error_law`], [`cell_average`] | the law of these errors, averages of them over cells, their standard errors |
@@ -14,6 +15,7 @@
 //! | `region`, `ray_information` | radius of regions; information of a pulse on the velocity about a range |
 //! | `response`, `plane` | what the estimators show of a wake; the wind on a cross-plane |
 
+pub(crate) mod accumulation;
 pub mod beam_winds;
 pub mod bound;
 pub mod budget;

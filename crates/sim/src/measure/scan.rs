@@ -22,6 +22,8 @@ use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::scan::PulseKey;
 use wakescope_signal::{LineOfSight, RangeFilter, Record, Scan, Shot, Simulator};
 
+pub(crate) mod products;
+
 /// Size of a piece of records, bytes.
 const PIECE_BYTES: usize = 16 << 20;
 /// Size of the winds of a piece, where pulses have their own, bytes.

@@ -1,7 +1,10 @@
 //! The stages along the lines of sight: wind, signals and noise; what each needs.
 
 use crate::Error;
+use crate::measure::accumulation::lags_per_window;
+use crate::measure::accumulation::{Pulses, draw_s, factor_bytes, factor_s, of_pulses, record_s};
 use crate::measure::efficiency_model::drawn_turbulence;
+use crate::measure::scan::products::{kept_factors, lines_at_once};
 use crate::measure::scan::{WINDS_BYTES, records_at_once};
 use crate::plan::line_wind::radial_velocity_m_s;
 use crate::plan::{Plan, PlannedStage, Stage, Target};
@@ -40,10 +43,20 @@ pub(crate) fn signals(plan: &Plan) -> PlannedStage {
     }
     let n = &plan.counts;
     let scan = &plan.scene().scan;
-    let reason = format!(
-        "{} x {} records of {} samples, {} layers each",
-        n.realisations, n.records, plan.geometry.samples, plan.geometry.layers_per_sample
-    );
+    let g = &plan.geometry;
+    let reason = match of_pulses(plan) {
+        Pulses::Drawn => format!(
+            "{} x {} lines of {} samples, products of all pulses drawn at once",
+            n.realisations, n.lines, g.samples
+        ),
+        Pulses::Records(why) => {
+            let why = why.map_or(String::new(), |why| format!("; not drawn at once: {why}"));
+            format!(
+                "{} x {} records of {} samples, {} layers each{why}",
+                n.realisations, n.records, g.samples, g.layers_per_sample
+            )
+        }
+    };
     let kept_line_bytes = if n.kept > 0.0 {
         n.lines * n.layers * 8.0
     } else {
@@ -77,12 +90,14 @@ pub(crate) fn noise(plan: &Plan) -> PlannedStage {
         return PlannedStage::skipped(Stage::Noise, "detector.noise is \"none\"");
     }
     let n = &plan.counts;
-    let values = n.realisations * n.records * n.samples * n.parts;
-    PlannedStage::running(Stage::Noise, format!("{values} samples")).with_memory(
-        0.0,
-        0.0,
-        fewer_layers(plan),
-    )
+    let reason = match of_pulses(plan) {
+        Pulses::Drawn => "in the products".into(),
+        Pulses::Records(_) => {
+            let values = n.realisations * n.records * n.samples * n.parts;
+            format!("{values} samples")
+        }
+    };
+    PlannedStage::running(Stage::Noise, reason).with_memory(0.0, 0.0, fewer_layers(plan))
 }
 
 /// Keys that reduce the layers of all lines.
@@ -102,9 +117,21 @@ pub(crate) fn wind_bytes(plan: &Plan) -> f64 {
 }
 
 /// Memory that is held while signals are made, bytes: the winds, the plans of carrier and noise,
-/// for each thread the layers and the transforms of a record, and a piece of records.
+/// for each thread the layers and the transforms of a record, and a piece of records; for draws
+/// the factors of lines, for each thread the matrices of one, and a piece of products.
 pub(crate) fn scan_bytes(plan: &Plan) -> f64 {
     let n = &plan.counts;
+    if of_pulses(plan) == Pulses::Drawn {
+        let products_bytes = n.samples * n.parts * 8.0 * lags_per_window(plan) as f64;
+        let at_once = lines_at_once(plan.geometry.elevation_rad.len(), products_bytes as usize);
+        // Beside the factor the covariance of the envelope, that of the record, the triangle and
+        // their product.
+        let of_thread = n.samples.powi(2) * 16.0 + 4.0 * factor_bytes(plan);
+        return wind_bytes(plan)
+            + kept_lines(plan) * factor_bytes(plan)
+            + n.threads * of_thread
+            + at_once as f64 * products_bytes;
+    }
     let of_thread = n.layers * 48.0 + n.samples * 100.0;
     let numbers = plan.geometry.samples * n.parts as usize;
     let at_once = records_at_once::<f64>(numbers, n.records.min(1e15) as usize) as f64;
@@ -112,12 +139,6 @@ pub(crate) fn scan_bytes(plan: &Plan) -> f64 {
         + n.samples * 80.0
         + n.threads * of_thread
         + at_once * (n.samples * n.parts * 8.0 + 64.0)
-}
-
-/// Time of one record, s of one core.
-pub(crate) fn record_s(plan: &Plan) -> f64 {
-    let n = &plan.counts;
-    n.layers * 5.4e-8 + n.samples * (n.layers_per_sample * 1.2e-10 + 5e-8)
 }
 
 /// Time of the signals of all realisations and their winds, s of one core.
@@ -134,7 +155,20 @@ fn signals_s(plan: &Plan) -> f64 {
     };
     let winds = n.lines * winds_per_line as f64;
     let kept_s = n.kept * n.records * n.samples * n.parts * 4e-8;
-    n.realisations * (n.records * record_s(plan) + winds * n.layers * wind_s) + kept_s
+    let made_s = match of_pulses(plan) {
+        Pulses::Drawn => {
+            let again = (n.lines - kept_lines(plan)) * (n.realisations - 1.0);
+            (n.lines + again) * factor_s(plan) + n.realisations * n.lines * draw_s(plan)
+        }
+        Pulses::Records(_) => n.realisations * n.records * record_s(plan),
+    };
+    made_s + n.realisations * winds * n.layers * wind_s + kept_s
+}
+
+/// Lines whose factors are kept between realisations.
+fn kept_lines(plan: &Plan) -> f64 {
+    let lines = plan.geometry.elevation_rad.len();
+    kept_factors(lines, factor_bytes(plan) as usize, plan.realisations()) as f64
 }
 
 /// Time of the wind at one point, s of one core.

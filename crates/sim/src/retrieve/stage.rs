@@ -1,7 +1,7 @@
 //! The stage of the retrieval: what it needs, and scans too small for the test for a wake.
 
 use crate::Error;
-use crate::measure::scan_stages::record_s;
+use crate::measure::accumulation::record_s;
 use crate::plan::{Plan, PlannedStage, Stage, Target};
 use crate::scene::{Retrieval, RetrievalMethod};
 use wakescope_estimate::wake_detection::WakeDetector;

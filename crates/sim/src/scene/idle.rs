@@ -107,6 +107,10 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
         &["scan.pattern.azimuth_step_rad", "scan.head.dead_time_s"],
         pace.into(),
     );
+    if let Some(key) = scene.key_of_records() {
+        let purpose = format!("{key} has every record simulated anyway");
+        unused(true, &["scan.accumulation"], purpose);
+    }
     if let Turbulence::Refractive(turbulence) = &scene.atmosphere.turbulence {
         const SCREENS: [&str; 3] = [
             "atmosphere.turbulence.grid_points",

@@ -125,6 +125,16 @@ keys! {
         lidar: LidarPlace as omitted = LidarPlace::default(),
         /// How often the wind is sampled within a line: once or per pulse.
         wind_of_pulses: WindOfPulses as omitted = WindOfPulses::default(),
+        /// Sums over the pulses of a line: drawn at once where exact and cheaper, or from records.
+        accumulation: Accumulation as omitted = Accumulation::Auto,
+    }
+
+    /// How the pulses of a line are accumulated.
+    choice Accumulation {
+        /// Their sums drawn at once from the distribution, where that is exact and cheaper.
+        Auto = "auto",
+        /// Record by record.
+        Records = "records",
     }
 
     /// Output files.

@@ -1,7 +1,10 @@
 //! The records of a scene in the terms of the estimators: sampling, windows, noise, and the
 //! autocorrelation of the pulse.
 
-use super::{DetectorSignal, NoiseModel, PulseDefinition, PulseShape, Scene, Weighting};
+use super::{
+    DetectorSignal, Digitiser, EfficiencyOfPulse, NoiseModel, PulseDefinition, PulseShape,
+};
+use super::{Scene, Weighting, WindOfPulses};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use num_complex::Complex;
 use std::f64::consts::{LN_2, TAU};
@@ -39,6 +42,31 @@ impl Scene {
             }
             _ => 2.0 * LN_2.sqrt() * self.pulse_sigma_s(),
         }
+    }
+
+    /// The key that gives the pulses of a line records which are not independent Gaussian vectors of
+    /// one covariance, so that they are simulated one by one; `None` if no key does.
+    pub(crate) fn key_of_records(&self) -> Option<&'static str> {
+        let of_turbulence = self
+            .refractive_turbulence()
+            .is_some_and(|t| t.efficiency == EfficiencyOfPulse::Realisation);
+        let keys = [
+            (
+                "scan.wind_of_pulses",
+                self.scan.wind_of_pulses != WindOfPulses::default(),
+            ),
+            (
+                "detector.digitiser",
+                self.detector.digitiser != Digitiser::None {},
+            ),
+            ("atmosphere.turbulence.efficiency", of_turbulence),
+            ("laser.linewidth_hz", self.laser.linewidth_hz > 0.0),
+            (
+                "telescope.reflection_db",
+                self.telescope.reflection_db > f64::NEG_INFINITY,
+            ),
+        ];
+        keys.into_iter().find(|(_, acts)| *acts).map(|(key, _)| key)
     }
 
     /// Sampling of the records.

@@ -3,6 +3,7 @@
 // A test that cannot set up its input has failed.
 #![allow(clippy::unwrap_used)]
 
+mod accumulation;
 #[cfg(all(feature = "cli", feature = "plots"))]
 mod accuracy;
 #[cfg(all(feature = "cli", feature = "plots"))]

@@ -33,6 +33,7 @@ pub struct ScanSums<'s, S, T: ?Sized> {
     rows: Vec<f64>,
     rule: MissingRule,
     invalid: BTreeMap<usize, Vec<bool>>,
+    of_products: bool,
     /// Power of two by which the samples were divided; none before the first that is not 0.
     scale: Option<f64>,
     sample: PhantomData<fn(S)>,
@@ -89,6 +90,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
             held,
             rule: MissingRule::NOT_FINITE,
             invalid: BTreeMap::new(),
+            of_products: false,
             scale: None,
             sample: PhantomData,
         })
@@ -173,6 +175,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         let allowed = "a statistic that is a sum of products of samples";
         check("product_weights", f64::NAN, allowed, weights.is_some())?;
         let weights = weights.unwrap_or_default();
+        self.of_products = true;
         let last_line = first_line + products.len();
         let allowed = "at most the number of lines of the scan";
         check(
@@ -253,6 +256,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
             numbers,
             rows,
             invalid,
+            of_products,
             scale,
             ..
         } = self;
@@ -284,6 +288,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
             blocks,
             counts,
             invalid,
+            of_products,
             scale: scale.unwrap_or(1.0),
         }
     }

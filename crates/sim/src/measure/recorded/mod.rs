@@ -23,7 +23,8 @@ use spectra::spectra_of_scans;
 
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
-use crate::measure::map::{self, AddRecords, VelocityEstimates};
+use crate::measure::map::{self, VelocityEstimates};
+use crate::measure::map_estimator::WindowSums;
 use crate::measure::scan::Scanner;
 use crate::measure::scan::records_at_once;
 use crate::plan::scan_lines;
@@ -322,16 +323,16 @@ fn of_run<S: Sample>(
 ) -> Result<Box<VelocityEstimates>, Error> {
     let scanner = Scanner::new(plan, observer)?;
     let (lines, pulses) = (plan.geometry.elevation_rad.len() as u64, scanner.pulses());
-    let read = |realisation: usize, add: AddRecords<'_, S>| {
+    let read = |realisation: usize, sums: &mut [WindowSums<'_, S>]| {
         let scan = realisation * pulses..(realisation + 1) * pulses;
         for piece in pieces(scan.clone(), records.samples) {
             let samples = samples::<S>(records, piece.clone(), 0..records.samples)?;
-            add(piece.start - scan.start, samples.view())?;
+            map::add_records(sums, piece.start - scan.start, samples.view())?;
         }
         observer.advance(lines);
         Ok(Clipped::default())
     };
-    let maps = map::of_records(&[plan], &scanner, observer, read, |_, _| ())?;
+    let maps = map::of_sums(&[plan], &scanner, observer, read, |_, _| ())?;
     Ok(maps.into_iter().map(Box::new).next().unwrap_or_default())
 }
 

@@ -1,0 +1,92 @@
+//! How the pulses of a line are accumulated: record by record, or the sums of the products of their samples drawn at once.
+//!
+//! The draw has the distribution of the sums over records ([`wakescope_signal::AccumulatedProducts`]), but other random numbers. What
+//! decides does not depend on the machine, the number of realisations or the estimator, so that a realisation has the same numbers in
+//! a run, a sweep and a study of its accuracy.
+//!
+//! Check: forecasts of draws and records cross where benchmarks do (`cargo bench -p wakescope-signal -- products`).
+
+use crate::plan::{Plan, Target};
+use crate::scene::{Accumulation, RetrievalMethod};
+
+/// How the pulses of a scan are accumulated.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Pulses {
+    /// Their products are drawn at once.
+    Drawn,
+    /// Each has a record; with the reason where draws would be cheaper.
+    Records(Option<String>),
+}
+
+/// How a plan accumulates pulses.
+pub(crate) fn of_pulses(plan: &Plan) -> Pulses {
+    let pulses = plan.counts.records / plan.counts.lines;
+    if pulses * record_s(plan) < factor_s(plan) + draw_s(plan) {
+        return Pulses::Records(None);
+    }
+    match reason_for_records(plan) {
+        Some(reason) => Pulses::Records(Some(reason)),
+        None => Pulses::Drawn,
+    }
+}
+
+/// Why a plan needs the record of each pulse; `None` if it does not.
+fn reason_for_records(plan: &Plan) -> Option<String> {
+    let scene = plan.scene();
+    if let Some(key) = scene.key_of_records() {
+        return Some(format!("{key} acts on each"));
+    }
+    if !plan.target.has_map() || plan.kept_realisations() > 0 {
+        return Some("they are written".into());
+    }
+    if plan.target == Target::Run && has_retrieval_of_signals(plan) {
+        return Some("retrieval.methods fits them".into());
+    }
+    if scene.scan.accumulation == Accumulation::Records {
+        return Some("scan.accumulation = \"records\"".into());
+    }
+    None
+}
+
+fn has_retrieval_of_signals(plan: &Plan) -> bool {
+    let of_signals = [RetrievalMethod::Signals, RetrievalMethod::Envelope];
+    let retrieval = plan.scene().retrieval.as_ref();
+    retrieval.is_some_and(|r| of_signals.iter().any(|method| r.methods.contains(method)))
+}
+
+/// Lags of a window that its statistic has.
+pub(crate) fn lags_per_window(plan: &Plan) -> usize {
+    let e = &plan.scene().estimator;
+    e.few_lags().unwrap_or(e.window_samples)
+}
+
+/// Time of one record, s of one core.
+pub(crate) fn record_s(plan: &Plan) -> f64 {
+    let n = &plan.counts;
+    n.layers * 5.4e-8 + n.samples * (n.layers_per_sample * 1.2e-10 + 5e-8)
+}
+
+/// Time to factor the covariance of the records of a line, s of one core.
+pub(crate) fn factor_s(plan: &Plan) -> f64 {
+    let n = &plan.counts;
+    let pairs = n.samples * n.samples.min(lit_samples(plan));
+    pairs * n.layers_per_sample * 1e-9 + n.samples.powi(2) * 2e-8 + n.samples.powi(3) * 1.5e-10
+}
+
+/// Samples that a layer of air contributes to.
+fn lit_samples(plan: &Plan) -> f64 {
+    let g = &plan.geometry;
+    plan.counts.layers_per_sample * g.layer_thickness_m / g.sample_spacing_m
+}
+
+/// Time to draw the products of a line, s of one core.
+pub(crate) fn draw_s(plan: &Plan) -> f64 {
+    let n = &plan.counts;
+    n.parts * (n.samples.powi(2) * 1e-8 + n.samples.powi(3) * 2e-11)
+}
+
+/// Memory of the factor of a line, bytes.
+pub(crate) fn factor_bytes(plan: &Plan) -> f64 {
+    let n = &plan.counts;
+    n.samples.powi(2) * n.parts * 8.0
+}
