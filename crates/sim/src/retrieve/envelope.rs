@@ -2,11 +2,12 @@
 //!
 //! Check: a pair's envelopes, inverted, have its circulation, and raw ones more, in the tests of the program.
 
-use super::table::{RetrievedScan, name, refused};
+use super::table::{RetrievedScan, measured, name, refused};
 use crate::Error;
 use crate::io::Table;
 use crate::measure::recorded::{Spectra, upward};
 use crate::plan::Plan;
+use crate::scene::Scene;
 use ndarray::Array3;
 use std::ops::Range;
 use wakescope_estimate::Measured;
@@ -30,21 +31,11 @@ pub fn envelopes(
     snr: f64,
     found: &mut RetrievedScan,
 ) -> Result<Vec<EnvelopeResult>, Error> {
-    let scene = plan.scene();
-    let refuse = |reason: &str| Error::Input {
-        path: found.scan.path.clone(),
-        reason: reason.into(),
-    };
-    let (
-        true,
-        Weighting::Gaussian {
-            relative_half_width,
-        },
-    ) = (scene.pulse.is_gaussian(), scene.weighting())
-    else {
-        return Err(refuse(
-            "--method envelope knows Gaussian pulses and windows alone: estimator.weighting = \"gaussian\"",
-        ));
+    let Some(shape) = gaussian_shape(plan)? else {
+        return Err(Error::Input {
+            path: found.scan.path.clone(),
+            reason: "--method envelope knows Gaussian pulses and windows alone: estimator.weighting = \"gaussian\"".into(),
+        });
     };
     let Some(about) = found
         .result
@@ -53,16 +44,6 @@ pub fn envelopes(
     else {
         return Ok(Vec::new());
     };
-    let window_sigma_s =
-        relative_half_width * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
-    let wavelength_m = scene.laser.wavelength_m;
-    let band_hz = scene.detector.bandwidth_hz;
-    let shape = SpectralShape::gaussian(
-        plan.instrument.pulse.sigma_s(),
-        window_sigma_s,
-        wavelength_m,
-        band_hz,
-    )?;
     let gates = spectra.range_m.len();
     let cells = spectra.velocity_m_s.len();
     let order = upward(lines, &spectra.elevation_rad);
@@ -73,11 +54,7 @@ pub fn envelopes(
         .iter()
         .map(|line| spectra.elevation_rad[*line])
         .collect();
-    // Independent cells of the maximum over all frequencies of the band.
-    let count = 3.0 * band_hz * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
-    let of_cell = -((-FALSE_ALARM).ln_1p() / count).exp_m1();
-    let windows = scene.scan.pulses_per_line as f64;
-    let threshold = cell_threshold(windows, of_cell)?;
+    let threshold = threshold(plan.scene())?;
     let scan = ScanSpectra {
         elevation_rad: &elevation_rad,
         range_m: &spectra.range_m,
@@ -99,21 +76,50 @@ pub fn envelopes(
     Ok(results.to_vec())
 }
 
+/// The spectra of a scene with a Gaussian pulse and window; nothing for others.
+fn gaussian_shape(plan: &Plan) -> Result<Option<SpectralShape>, Error> {
+    let scene = plan.scene();
+    let Weighting::Gaussian {
+        relative_half_width,
+    } = scene.weighting()
+    else {
+        return Ok(None);
+    };
+    if !scene.pulse.is_gaussian() {
+        return Ok(None);
+    }
+    let window_sigma_s =
+        relative_half_width * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
+    let shape = SpectralShape::gaussian(
+        plan.instrument.pulse.sigma_s(),
+        window_sigma_s,
+        scene.laser.wavelength_m,
+        scene.detector.bandwidth_hz,
+    )?;
+    Ok(Some(shape))
+}
+
+/// Power over the noise that the highest cell of noise exceeds at the false-alarm rate.
+fn threshold(scene: &Scene) -> Result<f64, Error> {
+    let band_hz = scene.detector.bandwidth_hz;
+    // Independent cells of the maximum over all frequencies of the band.
+    let count = 3.0 * band_hz * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
+    let of_cell = -((-FALSE_ALARM).ln_1p() / count).exp_m1();
+    Ok(cell_threshold(scene.scan.pulses_per_line as f64, of_cell)?)
+}
+
 /// Raw, narrowed and inverted circulations of each scan.
 pub fn envelope_table(all: &[(usize, EnvelopeResult)]) -> Table {
-    Table::new()
+    let results = all.iter().map(|(_, result)| result);
+    let raw_m2_s = results.clone().map(|r| r.raw_m2_s);
+    let narrowed_m2_s = results.clone().map(|r| r.narrowed_m2_s);
+    let inverted = results.clone().map(|r| r.inverted_m2_s);
+    let table = Table::new()
         .int("scan", all.iter().map(|(scan, _)| *scan as i64))
-        .text("side", all.iter().map(|(_, r)| name(r.side)))
-        .float("raw_m2_s", all.iter().map(|(_, r)| r.raw_m2_s))
-        .float("narrowed_m2_s", all.iter().map(|(_, r)| r.narrowed_m2_s))
-        .float(
-            "inverted_m2_s",
-            all.iter().map(|(_, r)| r.inverted_m2_s.value),
-        )
-        .float(
-            "inverted_std_m2_s",
-            all.iter().map(|(_, r)| r.inverted_m2_s.std),
-        )
-        .int("lines", all.iter().map(|(_, r)| r.lines as i64))
-        .int("left_out", all.iter().map(|(_, r)| r.left_out as i64))
+        .text("side", results.clone().map(|r| name(r.side)))
+        .float("raw_m2_s", raw_m2_s)
+        .float("narrowed_m2_s", narrowed_m2_s);
+    measured(table, "inverted_m2_s", inverted)
+        .int("lines", results.clone().map(|r| r.lines as i64))
+        .int("left_out", results.map(|r| r.left_out as i64))
 }

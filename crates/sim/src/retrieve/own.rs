@@ -13,7 +13,7 @@ use crate::progress::Observer;
 use crate::scene::DetectorSignal;
 use ndarray::{Array2, ArrayView2, Axis};
 use num_complex::Complex;
-use wakescope_estimate::retrieval::{Flag, ScanMap, Top};
+use wakescope_estimate::retrieval::{Flag, ScanMap};
 use wakescope_estimate::vortex_fit::{SignalFit, SignalFitOptions, Wake, fit_signals};
 use wakescope_estimate::window::Sample;
 
@@ -75,18 +75,17 @@ impl SceneResponse {
             return Ok(found);
         };
         let setup = self.setup(found.options.model, elevation_rad)?;
-        let snr = |range_m: f64, _: f64| {
-            // Whenever the fit makes a model of the lines.
-            observer.advance(0);
-            self.snr_at(range_m)
-        };
         let fit_options = SignalFitOptions {
             free: found.options.free,
             ..SignalFitOptions::default()
         };
         let fit = match fit_signals(
             &setup,
-            snr,
+            |range_m, _| {
+                // Whenever the fit makes a model of the lines.
+                observer.advance(0);
+                self.snr_at(range_m)
+            },
             samples,
             self.noise_power_a2,
             &guess,
@@ -99,38 +98,32 @@ impl SceneResponse {
             }
             fit => fit.map_err(|error| refused(&found.scan, &error))?,
         };
-        let SignalFit {
-            wake,
-            covariance,
-            tops,
-            log_likelihood_gain,
-            used_rays,
-            ..
-        } = fit;
-        let least = tops
-            .iter()
-            .map(|top| top.chi2)
-            .fold(f64::INFINITY, f64::min);
-        let tops = tops
-            .iter()
-            .map(|top| Top {
-                chi2: top.chi2 - least,
-                ..*top
-            })
-            .collect();
-        let mut result = found.result.with_wake(
-            &found.scan.map,
-            &found.options.model,
-            (wake, covariance),
-            tops,
-            false,
-        );
-        result.statistic = 2.0 * log_likelihood_gain;
-        result.cells_used = used_rays;
-        result.cells_rejected = setup.elevation_rad.len() - used_rays;
-        result.chi2_per_dof = f64::NAN;
-        Ok(RetrievedScan { result, ..found })
+        Ok(with_signal_fit(found, fit, setup.elevation_rad.len()))
     }
+}
+
+/// The scan with the result of a fit to its signals, of so many rays, in place of that of its map.
+fn with_signal_fit(found: RetrievedScan, fit: SignalFit, rays: usize) -> RetrievedScan {
+    let mut tops = fit.tops;
+    let least = tops
+        .iter()
+        .map(|top| top.chi2)
+        .fold(f64::INFINITY, f64::min);
+    for top in &mut tops {
+        top.chi2 -= least;
+    }
+    let mut result = found.result.with_wake(
+        &found.scan.map,
+        &found.options.model,
+        (fit.wake, fit.covariance),
+        tops,
+        false,
+    );
+    result.statistic = 2.0 * fit.log_likelihood_gain;
+    result.cells_used = fit.used_rays;
+    result.cells_rejected = rays - fit.used_rays;
+    result.chi2_per_dof = f64::NAN;
+    RetrievedScan { result, ..found }
 }
 
 /// A scan of recorded signals as a map for a retrieval.

@@ -6,9 +6,8 @@ use super::table::{PlaneTrack, RetrievedScan, TRACK};
 use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
-use ndarray::Array2;
 use wakescope_estimate::Measured;
-use wakescope_estimate::retrieval::{Flag, ScanResult, Side, TrackPoint, expected_velocities};
+use wakescope_estimate::retrieval::{Flag, Side, expected_velocities};
 
 /// Velocities, the fitted wake and the residual of a scan side by side; velocities alone where no wake was found.
 ///
@@ -37,14 +36,14 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
             elevation_rad: *elevation_rad,
             ..Ray::default()
         });
-    let field = |(name, text, values): &(&'static str, &str, Array2<f64>)| {
+    let map_fields = fields.iter().map(|(name, text, values)| {
         Field::float(name, Unit::METRE_PER_SECOND, text, values.clone())
-    };
+    });
     let shown = VelocityMap {
         rays: rays.collect(),
         range_m: map.range_m.clone(),
         sweeps: vec![Sweep::rhi(f64::NAN, 0.0)],
-        fields: fields.iter().map(field).collect(),
+        fields: map_fields.collect(),
         lidar_y_m: scan.options.model.lidar_lateral_position_m,
         lidar_height_m: scan.options.model.lidar_height_m,
         ..VelocityMap::default()
@@ -73,16 +72,14 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
 }
 
 fn title(scan: &RetrievedScan, number: usize) -> String {
-    let of = |side: Side| {
-        let vortex = scan.result.vortex(side)?;
-        let name = super::name(side);
-        let mean = vortex.circulation_5_15_m2_s;
-        Some(format!(
-            "{name} Γ(5-15 m) = {:.0} ± {:.0} m²/s",
-            mean.value, mean.std
-        ))
-    };
-    let found: Vec<String> = Side::BOTH.into_iter().filter_map(of).collect();
+    let mut found = Vec::new();
+    for side in Side::BOTH {
+        if let Some(vortex) = scan.result.vortex(side) {
+            let name = super::name(side);
+            let Measured { value, std } = vortex.circulation_5_15_m2_s;
+            found.push(format!("{name} Γ(5-15 m) = {value:.0} ± {std:.0} m²/s"));
+        }
+    }
     let found = if found.is_empty() {
         "no wake".to_owned()
     } else {
@@ -93,47 +90,23 @@ fn title(scan: &RetrievedScan, number: usize) -> String {
 
 /// Circulation, lateral position and height against time, with bands of one standard deviation and the results of the scans.
 pub fn track_figure(of_plane: &PlaneTrack, scans: &[RetrievedScan]) -> Figure {
-    let track = &of_plane.track;
     let panels = [
         ("Circulation", "circulation [m²/s]", 0),
         ("Lateral position", "distance [m]", 1),
         ("Height", "height [m]", 2),
-    ];
-    let panel = |(title, label, column): (&str, &str, usize)| {
-        let (_, get) = TRACK[column];
+    ]
+    .map(|(title, label, column)| {
         let mut plot = CurvePlot::new(title, Axis::linear("time [s]"), Axis::linear(label));
         for (colour, side) in Side::BOTH.into_iter().enumerate() {
-            let of_point = |point: &TrackPoint| {
-                let vortex = point.vortices.iter().find(|vortex| vortex.side == side)?;
-                Some((point.time_s, get(vortex)))
-            };
-            let of_track: Vec<(f64, Measured)> = track.points.iter().filter_map(of_point).collect();
-            let of_scan = |result: &ScanResult| {
-                let vortex = result.vortex(side)?;
-                let of = [
-                    vortex.circulation_m2_s,
-                    vortex.lateral_position_m,
-                    vortex.height_m,
-                ];
-                Some((result.reference_time_s, of[column].value))
-            };
-            let stds: Vec<f64> = of_track.iter().map(|(_, m)| m.std).collect();
-            let line = Series::new(
-                &super::name(side),
-                Style::Line,
-                of_track.iter().map(|(t, m)| (*t, m.value)),
-            );
-            let own = of_plane.scans.iter();
-            let dots = own.filter_map(|number| of_scan(&scans[*number].result));
             plot = plot
-                .with(line.with_band(&stds).in_colour(colour))
-                .with(Series::new("", Style::Markers, dots).in_colour(colour));
+                .with(track_line(of_plane, side, column).in_colour(colour))
+                .with(scan_dots(of_plane, scans, side, column).in_colour(colour));
         }
         CurvePlot {
             shape: 0.75,
             ..plot
         }
-    };
+    });
     let plane = of_plane
         .azimuth_rad
         .map_or_else(String::new, |azimuth_rad| {
@@ -142,6 +115,38 @@ pub fn track_figure(of_plane: &PlaneTrack, scans: &[RetrievedScan]) -> Figure {
     let title = format!("Track of the vortices{plane}: smoothed, with one standard deviation");
     Figure {
         width: 1560.0,
-        ..Figure::side_by_side(panels.map(panel)).titled(&title)
+        ..Figure::side_by_side(panels).titled(&title)
     }
+}
+
+/// A column of the track of a vortex against time, with a band of one standard deviation.
+fn track_line(of_plane: &PlaneTrack, side: Side, column: usize) -> Series {
+    let (_, get) = TRACK[column];
+    let mut points = Vec::new();
+    let mut stds = Vec::new();
+    for point in &of_plane.track.points {
+        if let Some(vortex) = point.vortices.iter().find(|vortex| vortex.side == side) {
+            let Measured { value, std } = get(vortex);
+            points.push((point.time_s, value));
+            stds.push(std);
+        }
+    }
+    Series::new(&super::name(side), Style::Line, points).with_band(&stds)
+}
+
+/// Circulation, lateral position or height of a vortex in each scan of the track.
+fn scan_dots(of_plane: &PlaneTrack, scans: &[RetrievedScan], side: Side, column: usize) -> Series {
+    let mut points = Vec::new();
+    for number in &of_plane.scans {
+        let result = &scans[*number].result;
+        if let Some(vortex) = result.vortex(side) {
+            let columns = [
+                vortex.circulation_m2_s,
+                vortex.lateral_position_m,
+                vortex.height_m,
+            ];
+            points.push((result.reference_time_s, columns[column].value));
+        }
+    }
+    Series::new("", Style::Markers, points)
 }

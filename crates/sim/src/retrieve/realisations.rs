@@ -9,6 +9,7 @@ use super::table::{RetrievedScan, flags};
 use super::truth::{true_vortices, true_wake};
 use crate::Error;
 use crate::detection::{Calibration, DetectionSettings, SceneNoise};
+use crate::io::scans::ReadScan;
 use crate::measure::recorded::{spectra_of_samples, upward};
 use crate::measure::response::SceneResponse;
 use crate::measure::scan::Scanner;
@@ -17,7 +18,7 @@ use crate::progress::{Observer, Silent};
 use crate::scene::{FollowingAircraft, RetrievalMethod as Method, Scene};
 use ndarray::{Array2, ArrayView2};
 use wakescope_estimate::retrieval::{Flag, RetrievalOptions, ScanMap, Velocities, VortexResult};
-use wakescope_estimate::vortex_fit::{CoreProfile, Follower, Wake, WakeModel};
+use wakescope_estimate::vortex_fit::{CoreProfile, Follower, WakeModel};
 use wakescope_estimate::window::Sample;
 
 /// Empty scans of the test for a wake.
@@ -68,14 +69,11 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
         return Ok(None);
     };
     let sweeps = upward_sweeps(plan);
-    let truths = sweeps
-        .iter()
-        .map(|lines| true_vortices(plan, lines))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut truths = Vec::with_capacity(sweeps.len());
+    for lines in &sweeps {
+        truths.push(true_vortices(plan, lines)?);
+    }
     let own = SceneResponse::new(plan, scanner.layer_snr())?;
-    let velocities = own
-        .as_ref()
-        .map_or(Velocities::Unknown, |own| Velocities::Estimates(own));
     let options = options(
         Some(scene),
         gate_of(None, None, Some(scene))?.0,
@@ -90,84 +88,106 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
         (maps.len() * sweeps.len() * wanted.methods.len()) as u64,
     );
     let mut rows = Vec::new();
-    let g = &plan.geometry;
-    let time_s: Vec<f64> = g
-        .line_time_s
-        .iter()
-        .map(|t| plan.wind.start_s + t)
-        .collect();
-    let each = maps.iter().enumerate().flat_map(|map| {
-        sweeps
-            .iter()
-            .zip(&truths)
-            .enumerate()
-            .map(move |of| (map, of))
-    });
-    for ((realisation, velocity_m_s), (sweep, (lines, truth))) in each {
-        let scan = || {
-            scan_of_lines(
-                "retrieval",
-                plan,
-                lines,
-                [&g.elevation_rad, &time_s],
-                velocity_m_s,
-            )
-        };
+    for (realisation, velocity_m_s) in maps.iter().enumerate() {
         let test = tests.get(realisation).copied();
-        let by = |method| {
-            let mut options = options.clone();
-            if test.is_some_and(is_detected) {
-                options.threshold_of_estimates = 0.0;
+        let mut map_options = options.clone();
+        if test.is_some_and(is_detected) {
+            map_options.threshold_of_estimates = 0.0;
+        }
+        for (sweep, (lines, truth)) in sweeps.iter().zip(&truths).enumerate() {
+            let scan = scan_of_sweep(plan, lines, velocity_m_s);
+            let records = (realisation, &lines[..]);
+            let own = own.as_ref();
+            let found =
+                by_methods::<S>(plan, scanner, own, &scan, records, &map_options, observer)?;
+            for (&method, found) in wanted.methods.iter().zip(found) {
+                let found = match test {
+                    Some(test) => found.map(|found| compared_with_test(found, test)),
+                    None => found,
+                };
+                let number = (realisation, sweep, method);
+                rows.extend(rows_of(
+                    scene,
+                    number,
+                    truth,
+                    found.as_ref(),
+                    &options.model,
+                )?);
             }
-            let found = retrieve_map(scan(), method, options, velocities).ok();
-            found.map(|(found, _)| found)
-        };
-        // the fit of the map also starts that of the signals
-        let of_map = wanted
-            .methods
-            .iter()
-            .any(|method| *method != Method::Rv)
-            .then(|| by(Method::Fit))
-            .flatten();
-        for &method in &wanted.methods {
-            let found = match (method, of_map.clone(), &own) {
-                (Method::Rv, ..) => by(method),
-                (Method::Signals | Method::Envelope, Some(map), Some(own)) => of_signals::<S>(
-                    plan,
-                    scanner,
-                    (method, own),
-                    (realisation, lines),
-                    map,
-                    observer,
-                )?,
-                (_, map, _) => map.filter(|_| method == Method::Fit),
-            };
-            let found = match test {
-                Some(test) => found.map(|found| compared_with_test(found, test)),
-                None => found,
-            };
-            rows.extend(rows_of(
-                scene,
-                (realisation, sweep, method),
-                truth,
-                found.as_ref(),
-                &options.model,
-            )?);
-            observer.advance(1);
         }
     }
     observer.end();
     Ok(Some(SceneRetrieval { rows, tests }))
 }
 
+/// What each requested method finds in a scan, whose records are those of some lines of a realisation.
+fn by_methods<S: Sample + wakescope_signal::Sample>(
+    plan: &Plan,
+    scanner: &Scanner<'_>,
+    own: Option<&SceneResponse>,
+    scan: &ReadScan,
+    records: (usize, &[usize]),
+    options: &RetrievalOptions,
+    observer: &dyn Observer,
+) -> Result<Vec<Option<RetrievedScan>>, Error> {
+    let methods: &[Method] = match &plan.scene().retrieval {
+        Some(wanted) => &wanted.methods,
+        None => &[],
+    };
+    let velocities = match own {
+        Some(own) => Velocities::Estimates(own),
+        None => Velocities::Unknown,
+    };
+    // the fit of the map also starts that of the signals
+    let of_map = if methods == [Method::Rv] {
+        None
+    } else {
+        found_in_map(scan, Method::Fit, options, velocities)
+    };
+    let mut all = Vec::with_capacity(methods.len());
+    for &method in methods {
+        all.push(match (method, of_map.clone(), own) {
+            (Method::Rv, ..) => found_in_map(scan, method, options, velocities),
+            (Method::Signals | Method::Envelope, Some(map), Some(own)) => {
+                of_signals::<S>(plan, scanner, (method, own), records, map, observer)?
+            }
+            (_, map, _) => map.filter(|_| method == Method::Fit),
+        });
+        observer.advance(1);
+    }
+    Ok(all)
+}
+
+/// The lines of a sweep of the map of a realisation as a scan.
+fn scan_of_sweep(plan: &Plan, lines: &[usize], velocity_m_s: &Array2<f64>) -> ReadScan {
+    let g = &plan.geometry;
+    let times_s = g.line_time_s.iter();
+    let times_s: Vec<f64> = times_s.map(|t| plan.wind.start_s + t).collect();
+    let axes = [&g.elevation_rad[..], &times_s];
+    scan_of_lines("retrieval", plan, lines, axes, velocity_m_s)
+}
+
+/// What a method finds in a map; nothing where it fails.
+fn found_in_map(
+    scan: &ReadScan,
+    method: Method,
+    options: &RetrievalOptions,
+    velocities: Velocities<'_>,
+) -> Option<RetrievedScan> {
+    let found = retrieve_map(scan.clone(), method, options.clone(), velocities).ok();
+    found.map(|(found, _)| found)
+}
+
 /// The lines of each sweep, by increasing elevation.
 fn upward_sweeps(plan: &Plan) -> Vec<Vec<usize>> {
     let g = &plan.geometry;
-    let of_sweep = |sweep: usize| {
-        let own = |line: &usize| g.schedule.lines[*line].sweep == sweep;
-        upward((0..g.schedule.lines.len()).filter(own), &g.elevation_rad)
-    };
-    (0..g.schedule.sweeps.len()).map(of_sweep).collect()
+    let mut sweeps = Vec::with_capacity(g.schedule.sweeps.len());
+    for sweep in 0..g.schedule.sweeps.len() {
+        let lines = 0..g.schedule.lines.len();
+        let own = lines.filter(|line| g.schedule.lines[*line].sweep == sweep);
+        sweeps.push(upward(own, &g.elevation_rad));
+    }
+    sweeps
 }
 
 /// What the signals of some lines of a realisation, which are made again, give by fit or envelopes; the wake of the map starts them.
@@ -188,21 +208,16 @@ fn of_signals<S: Sample + wakescope_signal::Sample>(
         return Ok(None);
     };
     let schedule = &plan.geometry.schedule;
-    let is_own = |pulse: usize| lines.contains(&schedule.line_of(pulse));
     let mut samples: Vec<S> = Vec::new();
     let mut elevation_rad: Vec<f64> = Vec::new();
     scanner.in_pieces::<S>(realisation, &Silent, |first, records| {
-        for (pulse, record) in (first..)
-            .zip(records.outer_iter())
-            .filter(|(pulse, _)| is_own(*pulse))
-        {
-            samples.extend(record);
+        for (pulse, record) in (first..).zip(records.outer_iter()) {
             let line = schedule.line_of(pulse);
-            elevation_rad.push(
-                schedule
-                    .beam(line, (pulse - schedule.lines[line].first) as f64)
-                    .elevation_rad,
-            );
+            if lines.contains(&line) {
+                samples.extend(record);
+                let pulse_of_line = (pulse - schedule.lines[line].first) as f64;
+                elevation_rad.push(schedule.beam(line, pulse_of_line).elevation_rad);
+            }
         }
         Ok(())
     })?;
@@ -249,49 +264,43 @@ fn rows_of(
     found: Option<&RetrievedScan>,
     model: &WakeModel,
 ) -> Result<[RetrievalRow; 2], Error> {
-    let follower = scene
-        .retrieval
-        .as_ref()
-        .and_then(|r| r.follower)
-        .map(|aircraft| {
-            let FollowingAircraft {
-                span_m,
-                aspect_ratio,
-                speed_m_s,
-                slope,
-            } = aircraft;
-            Follower {
-                span_m,
-                aspect_ratio,
-                speed_m_s,
-                slope,
+    let mut rolling_moments = [(f64::NAN, f64::NAN); 2];
+    let aircraft = scene.retrieval.as_ref().and_then(|r| r.follower);
+    // the coefficient is known for the profile (3)
+    if let Some(aircraft) = aircraft.filter(|_| model.profile == CoreProfile::Algebraic) {
+        let follower = follower(&aircraft);
+        for (moments, truth_of) in rolling_moments.iter_mut().zip(truth) {
+            if let Some(wake) = found.and_then(|found| found.result.wake)
+                && let Some(vortex) = found.and_then(|found| found.result.vortex(truth_of.side))
+            {
+                moments.0 = follower.rolling_moment(model, &wake, vortex.place_m())?;
             }
-        });
-    let moment = |wake: Option<Wake>, at: Option<(f64, f64)>| match (&follower, wake.zip(at)) {
-        // the coefficient is known for the profile (3)
-        (Some(follower), Some((wake, at))) if model.profile == CoreProfile::Algebraic => {
-            follower.rolling_moment(model, &wake, at)
+            if let Some(wake) = true_wake(truth) {
+                moments.1 = follower.rolling_moment(model, &wake, truth_of.place_m())?;
+            }
         }
-        _ => Ok(f64::NAN),
-    };
-    let row = |truth_of: VortexResult| -> Result<RetrievalRow, Error> {
-        let vortex = found.and_then(|found| found.result.vortex(truth_of.side).copied());
-        let wake = found.and_then(|found| found.result.wake);
-        Ok(RetrievalRow {
-            realisation,
-            sweep,
-            method,
-            found: vortex,
-            truth: truth_of,
-            rolling_moment: (
-                moment(wake, vortex.map(|vortex| vortex.place_m()))?,
-                moment(true_wake(truth), Some(truth_of.place_m()))?,
-            ),
-            chi2_per_dof: found.map_or(f64::NAN, |found| found.result.chi2_per_dof),
-            flags: found.map_or_else(String::new, |found| flags(&found.result)),
-        })
-    };
-    Ok([row(truth[0])?, row(truth[1])?])
+    }
+    let result = found.map(|found| &found.result);
+    let chi2_per_dof = result.map_or(f64::NAN, |result| result.chi2_per_dof);
+    Ok([0, 1].map(|i| RetrievalRow {
+        realisation,
+        sweep,
+        method,
+        found: result.and_then(|result| result.vortex(truth[i].side).copied()),
+        truth: truth[i],
+        rolling_moment: rolling_moments[i],
+        chi2_per_dof,
+        flags: result.map_or_else(String::new, flags),
+    }))
+}
+
+fn follower(aircraft: &FollowingAircraft) -> Follower {
+    Follower {
+        span_m: aircraft.span_m,
+        aspect_ratio: aircraft.aspect_ratio,
+        speed_m_s: aircraft.speed_m_s,
+        slope: aircraft.slope,
+    }
 }
 
 /// Tests of all maps for a wake, calibrated on the noise of the scene.
@@ -318,15 +327,14 @@ fn tests(
         &settings,
         observer,
     )?;
-    let test = |map: &Array2<f64>| {
-        let found = calibration.of_scan(
-            &ScanMap {
-                velocity_m_s: map.clone(),
-                ..empty.clone()
-            },
-            &settings,
-        )?;
-        Ok((found.statistic.value, found.threshold))
-    };
-    maps.iter().map(test).collect()
+    let mut tests = Vec::with_capacity(maps.len());
+    for map in maps {
+        let scan = ScanMap {
+            velocity_m_s: map.clone(),
+            ..empty.clone()
+        };
+        let found = calibration.of_scan(&scan, &settings)?;
+        tests.push((found.statistic.value, found.threshold));
+    }
+    Ok(tests)
 }

@@ -24,8 +24,10 @@ pub(crate) fn planned(plan: &Plan) -> Result<Option<PlannedStage>, Error> {
     };
     refuse_small_scan(plan, retrieval)?;
     let n = &plan.counts;
-    let has = |method| retrieval.methods.contains(&method);
-    let signals = if has(RetrievalMethod::Signals) || has(RetrievalMethod::Envelope) {
+    let methods = &retrieval.methods;
+    let signals = if methods.contains(&RetrievalMethod::Signals)
+        || methods.contains(&RetrievalMethod::Envelope)
+    {
         3.0
     } else {
         0.0

@@ -8,7 +8,7 @@ use super::truth::is_there;
 use crate::io::Table;
 use crate::scene::RetrievalMethod as Method;
 use wakescope_estimate::Measured;
-use wakescope_estimate::retrieval::Side;
+use wakescope_estimate::retrieval::{Side, VortexResult};
 
 /// Errors of one quantity of one vortex by one method: realisations, each as often as it has sweeps, and those without a value; the truth
 /// of the first one, mean error and its standard error, standard deviation, root mean square error, and root mean square of the
@@ -55,20 +55,19 @@ impl SceneRetrieval {
     fn errors(&self) -> Vec<Errors> {
         let mut all = Vec::new();
         // One scan has each method and side once.
-        for first in self
-            .rows
-            .iter()
-            .filter(|row| (row.realisation, row.sweep) == (0, 0))
-        {
-            let of = (first.method, first.truth.side);
-            let is_own =
-                |row: &&RetrievalRow| (row.method, row.truth.side) == of && is_there(&row.truth);
-            let rows: Vec<_> = self.rows.iter().filter(is_own).collect();
+        for first in &self.rows {
+            if (first.realisation, first.sweep) != (0, 0) {
+                continue;
+            }
+            let method = first.method;
+            let side = first.truth.side;
+            let mut rows: Vec<&RetrievalRow> = self.rows.iter().collect();
+            rows.retain(|row| row.method == method && row.truth.side == side);
+            rows.retain(|row| is_there(&row.truth));
             for (number, name) in quantities() {
-                all.extend(
-                    errors(number, &rows)
-                        .map(|(counts, numbers)| (of.0, of.1, name, counts, numbers)),
-                );
+                if let Some((counts, numbers)) = errors(number, &rows) {
+                    all.push((method, side, name, counts, numbers));
+                }
             }
         }
         all
@@ -85,27 +84,35 @@ impl SceneRetrieval {
     #[must_use]
     pub fn error_table(&self) -> Table {
         let all = self.errors();
-        let number = |i: usize| all.iter().map(move |(.., numbers)| numbers[i]);
-        let count = |i: usize| all.iter().map(move |(_, _, _, counts, _)| counts[i] as i64);
+        let mut counts: [Vec<i64>; 2] = Default::default();
+        let mut numbers: [Vec<f64>; 6] = Default::default();
+        for (.., row_counts, row_numbers) in &all {
+            for (column, count) in counts.iter_mut().zip(row_counts) {
+                column.push(*count as i64);
+            }
+            for (column, number) in numbers.iter_mut().zip(row_numbers) {
+                column.push(*number);
+            }
+        }
+        let [realisations, failures] = counts;
+        let [truth, bias, bias_standard_error, std, rms, stated_std] = numbers;
         Table::new()
             .text("method", all.iter().map(|(method, ..)| method.name()))
             .text("side", all.iter().map(|(_, side, ..)| word(side)))
             .text("quantity", all.iter().map(|(_, _, quantity, ..)| *quantity))
-            .float("truth", number(0))
-            .int("realisations", count(0))
-            .int("failures", count(1))
-            .float("bias", number(1))
-            .float("bias_standard_error", number(2))
-            .float("std", number(3))
-            .float("rms", number(4))
-            .float("stated_std", number(5))
+            .float("truth", truth)
+            .int("realisations", realisations)
+            .int("failures", failures)
+            .float("bias", bias)
+            .float("bias_standard_error", bias_standard_error)
+            .float("std", std)
+            .float("rms", rms)
+            .float("stated_std", stated_std)
     }
 
     /// The table of all vortices.
     #[must_use]
     pub fn table(&self) -> Table {
-        let number =
-            |get: &dyn Fn(&RetrievalRow) -> f64| self.rows.iter().map(get).collect::<Vec<_>>();
         let mut table = Table::new().int(
             "realisation",
             self.rows.iter().map(|row| row.realisation as i64),
@@ -116,39 +123,37 @@ impl SceneRetrieval {
         table = table
             .text("method", self.rows.iter().map(|row| row.method.name()))
             .text("side", self.rows.iter().map(|row| word(row.truth.side)))
-            .float(
-                "time_s",
-                number(&|row| row.found.map_or(row.truth.time_s, |v| v.time_s)),
-            );
+            .float("time_s", self.rows.iter().map(time_s));
         for (i, name) in quantities() {
-            table = measured(table, name, self.rows.iter().map(|row| quantity(row, i).0))
-                .float(&with(name, "true"), number(&|row| quantity(row, i).1));
+            let found = self.rows.iter().map(|row| quantity(row, i).0);
+            let truth = self.rows.iter().map(|row| quantity(row, i).1);
+            table = measured(table, name, found).float(&with(name, "true"), truth);
         }
-        let of_test = |row: &RetrievalRow| {
-            self.tests
-                .get(row.realisation)
-                .copied()
-                .unwrap_or((f64::NAN, f64::NAN))
-        };
+        let found = self.rows.iter().map(|row| row.found.as_ref());
+        let cores = found.map(core_m);
+        let true_cores = self.rows.iter().map(|row| core_m(Some(&row.truth)));
+        let tests = self.rows.iter().map(|row| self.tests.get(row.realisation));
+        let tests = tests.map(|test| *test.unwrap_or(&(f64::NAN, f64::NAN)));
+        let (statistics, thresholds): (Vec<f64>, Vec<f64>) = tests.unzip();
         table
-            .float(
-                "core_m",
-                number(&|row| {
-                    row.found
-                        .and_then(|v| v.core_radius_m)
-                        .unwrap_or(UNKNOWN)
-                        .value
-                }),
-            )
-            .float(
-                "core_true_m",
-                number(&|row| row.truth.core_radius_m.unwrap_or(UNKNOWN).value),
-            )
-            .float("chi2_per_dof", number(&|row| row.chi2_per_dof))
-            .float("statistic", number(&|row| of_test(row).0))
-            .float("threshold", number(&|row| of_test(row).1))
+            .float("core_m", cores)
+            .float("core_true_m", true_cores)
+            .float("chi2_per_dof", self.rows.iter().map(|row| row.chi2_per_dof))
+            .float("statistic", statistics)
+            .float("threshold", thresholds)
             .text("flags", self.rows.iter().map(|row| row.flags.clone()))
     }
+}
+
+/// Time of a vortex, s: that of the one found, or of the true one.
+fn time_s(row: &RetrievalRow) -> f64 {
+    row.found.map_or(row.truth.time_s, |found| found.time_s)
+}
+
+/// Core radius, m; NaN where it is not known.
+fn core_m(vortex: Option<&VortexResult>) -> f64 {
+    let core = vortex.and_then(|vortex| vortex.core_radius_m);
+    core.unwrap_or(UNKNOWN).value
 }
 
 fn errors(number: usize, rows: &[&RetrievalRow]) -> Option<([usize; 2], [f64; 6])> {
@@ -164,11 +169,10 @@ fn errors(number: usize, rows: &[&RetrievalRow]) -> Option<([usize; 2], [f64; 6]
         .map(|(found, truth)| (found.value - truth, found.std))
         .collect();
     let n = values.len() as f64;
-    let mean = |get: &dyn Fn(&(f64, f64)) -> f64| values.iter().map(get).sum::<f64>() / n;
-    let bias = mean(&|v| v.0);
+    let bias = values.iter().map(|v| v.0).sum::<f64>() / n;
     let std = (values.iter().map(|v| (v.0 - bias).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-    let rms = mean(&|v| v.0 * v.0).sqrt();
-    let stated = mean(&|v| v.1 * v.1).sqrt();
+    let rms = (values.iter().map(|v| v.0 * v.0).sum::<f64>() / n).sqrt();
+    let stated = (values.iter().map(|v| v.1 * v.1).sum::<f64>() / n).sqrt();
     // One value has no deviation.
     let own = if values.len() > 1 { std } else { f64::NAN };
     Some((

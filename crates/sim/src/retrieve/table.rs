@@ -11,6 +11,7 @@ use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{
     RetrievalOptions, ScanResult, Track, TrackedVortex, VortexResult, track,
 };
+use wakescope_estimate::vortex_fit::Wake;
 
 /// One scan with what was found in it.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,59 +55,49 @@ fn vortices_of(scans: &[RetrievedScan]) -> Vec<Row<'_>> {
 /// A row for each vortex and scan; a scan without a wake has one row without a vortex.
 pub fn rows(scans: &[RetrievedScan]) -> Table {
     let of = vortices_of(scans);
-    let of_scan =
-        |get: fn(&ScanResult) -> f64| of.iter().map(move |(_, scan, _)| get(&scan.result));
-    let time_s =
-        |(_, scan, vortex): &Row<'_>| vortex.map_or(scan.result.reference_time_s, |v| v.time_s);
+    let read = of.iter().map(|(_, scan, _)| &scan.scan);
+    let results = of.iter().map(|(_, scan, _)| &scan.result);
+    let vortices = of.iter().map(|(.., vortex)| *vortex);
+    let sweeps = read.clone().map(|scan| scan.sweep as i64);
+    let azimuths_rad = read
+        .clone()
+        .map(|scan| scan.azimuth_rad.unwrap_or(f64::NAN));
+    let mut times_s = Vec::with_capacity(of.len());
+    let mut sides = Vec::with_capacity(of.len());
+    for (_, scan, vortex) in &of {
+        times_s.push(vortex.map_or(scan.result.reference_time_s, |v| v.time_s));
+        sides.push(vortex.map_or_else(|| "none".to_owned(), |v| name(v.side)));
+    }
     let mut table = Table::new()
         .int("scan", of.iter().map(|(number, ..)| *number as i64))
-        .text("file", of.iter().map(|(_, scan, _)| scan.scan.file_name()))
-        .int(
-            "sweep",
-            of.iter().map(|(_, scan, _)| scan.scan.sweep as i64),
-        )
-        .float(
-            "azimuth_rad",
-            of.iter()
-                .map(|(_, scan, _)| scan.scan.azimuth_rad.unwrap_or(f64::NAN)),
-        )
-        .float("time_s", of.iter().map(time_s))
-        .text(
-            "side",
-            of.iter()
-                .map(|(.., vortex)| vortex.map_or_else(|| "none".to_owned(), |v| name(v.side))),
-        );
+        .text("file", read.map(ReadScan::file_name))
+        .int("sweep", sweeps)
+        .float("azimuth_rad", azimuths_rad)
+        .float("time_s", times_s)
+        .text("side", sides);
     for (name, get) in VORTEX {
-        table = measured(
-            table,
-            name,
-            of.iter()
-                .map(|(.., vortex)| vortex.and_then(get).unwrap_or(UNKNOWN)),
-        );
+        let numbers = vortices.clone();
+        let numbers = numbers.map(|vortex| vortex.and_then(get).unwrap_or(UNKNOWN));
+        table = measured(table, name, numbers);
     }
-    table = measured(
-        table,
-        "wind_m_s",
-        of.iter().map(|(_, scan, _)| scan.result.lateral_wind_m_s),
-    );
-    measured(
-        table,
-        "shear_per_s",
-        of.iter().map(|(_, scan, _)| scan.result.wind_shear_per_s),
-    )
-    .float("chi2_per_dof", of_scan(|result| result.chi2_per_dof))
-    .int(
-        "cells_used",
-        of.iter().map(|(_, scan, _)| scan.result.cells_used as i64),
-    )
-    .int(
-        "cells_rejected",
-        of.iter()
-            .map(|(_, scan, _)| scan.result.cells_rejected as i64),
-    )
-    .float("statistic", of_scan(|result| result.statistic))
-    .float("threshold", of_scan(|result| result.threshold))
-    .text("flags", of.iter().map(|(_, scan, _)| flags(&scan.result)))
+    let winds = results.clone().map(|result| result.lateral_wind_m_s);
+    let shears = results.clone().map(|result| result.wind_shear_per_s);
+    table = measured(table, "wind_m_s", winds);
+    table = measured(table, "shear_per_s", shears);
+    let cells_used = results.clone().map(|result| result.cells_used as i64);
+    let cells_rejected = results.clone().map(|result| result.cells_rejected as i64);
+    let statistics = results.clone().map(|result| result.statistic);
+    let thresholds = results.clone().map(|result| result.threshold);
+    table
+        .float(
+            "chi2_per_dof",
+            results.clone().map(|result| result.chi2_per_dof),
+        )
+        .int("cells_used", cells_used)
+        .int("cells_rejected", cells_rejected)
+        .float("statistic", statistics)
+        .float("threshold", thresholds)
+        .text("flags", results.map(flags))
 }
 
 /// A column of numbers and one of their deviations.
@@ -215,20 +206,19 @@ pub fn track_table(tracks: &[PlaneTrack]) -> Table {
             all.extend(own.map(|vortex| (azimuth_rad, point.time_s, vortex)));
         }
     }
-    let table = Table::new()
-        .float(
-            "azimuth_rad",
-            all.iter().map(|(azimuth_rad, ..)| *azimuth_rad),
-        )
-        .float("time_s", all.iter().map(|(_, time_s, _)| *time_s))
-        .text("side", all.iter().map(|(.., vortex)| name(vortex.side)))
-        .int(
-            "detected",
-            all.iter().map(|(.., vortex)| i64::from(vortex.detected)),
-        );
-    TRACK.iter().fold(table, |table, (name, get)| {
-        measured(table, name, all.iter().map(|(.., vortex)| get(vortex)))
-    })
+    let azimuths_rad = all.iter().map(|(azimuth_rad, ..)| *azimuth_rad);
+    let times_s = all.iter().map(|(_, time_s, _)| *time_s);
+    let vortices = all.iter().map(|(.., vortex)| *vortex);
+    let detected = vortices.clone().map(|vortex| i64::from(vortex.detected));
+    let mut table = Table::new()
+        .float("azimuth_rad", azimuths_rad)
+        .float("time_s", times_s)
+        .text("side", vortices.clone().map(|vortex| name(vortex.side)))
+        .int("detected", detected);
+    for (name, get) in TRACK {
+        table = measured(table, name, vortices.clone().map(get));
+    }
+    table
 }
 
 /// `gamma_m2_s` to `gamma_std_m2_s`: the unit stays at the end.
@@ -252,39 +242,48 @@ pub fn flags(result: &ScanResult) -> String {
 
 /// Everything that was found, with covariances and competing tops.
 pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
-    let names = || PARAMETER_NAMES.split(' ');
-    // JSON has no NaN: what is not known is null.
-    let wake = |values: [f64; 10]| -> Value {
-        names()
-            .zip(values)
-            .map(|(name, value)| (name.to_owned(), json!(value)))
-            .collect()
-    };
-    let of_vortex = |vortex: &VortexResult| -> Value {
-        let mut object = json!({ "side": vortex.side, "time_s": vortex.time_s });
-        for (name, get) in VORTEX {
-            object[name] = json!(get(vortex));
-        }
-        object
-    };
-    let of_scan = |(number, scan): (usize, &RetrievedScan)| -> Value {
-        let r = &scan.result;
-        let rows: Vec<Vec<f64>> = r.covariance.outer_iter().map(|row| row.to_vec()).collect();
-        json!({
-            "scan": number + 1, "file": scan.scan.path.to_string_lossy(), "sweep": scan.scan.sweep, "azimuth_rad": scan.scan.azimuth_rad,
-            "reference_time_s": r.reference_time_s,
-            "vortices": r.vortices.iter().map(of_vortex).collect::<Vec<_>>(),
-            "wind_m_s": r.lateral_wind_m_s, "shear_per_s": r.wind_shear_per_s,
-            "chi2_per_dof": r.chi2_per_dof, "cells_used": r.cells_used, "cells_rejected": r.cells_rejected,
-            "statistic": r.statistic, "threshold": r.threshold, "flags": r.flags,
-            "parameters": names().collect::<Vec<_>>(), "wake": r.wake.map(|found| wake(found.to_array())), "covariance": rows,
-            "secondary": scan.options.model.secondary.map(|both| both.map(|v| json!({
-                "gamma_m2_s": v.circulation_m2_s, "y_m": v.lateral_position_m, "z_m": v.height_m, "core_m": v.core_radius_m,
-            }))),
-            "tops": r.tops.iter().map(|top| json!({ "wake": wake(top.wake.to_array()), "chi2": top.chi2 })).collect::<Vec<_>>(),
-        })
-    };
-    Value::Array(scans.iter().enumerate().map(of_scan).collect())
+    let scans = scans.iter().enumerate();
+    Value::Array(scans.map(|(i, scan)| scan_json(i + 1, scan)).collect())
+}
+
+fn scan_json(number: usize, scan: &RetrievedScan) -> Value {
+    let r = &scan.result;
+    let vortices: Vec<Value> = r.vortices.iter().map(vortex_json).collect();
+    let parameters: Vec<&str> = PARAMETER_NAMES.split(' ').collect();
+    let covariance: Vec<Vec<f64>> = r.covariance.outer_iter().map(|row| row.to_vec()).collect();
+    let secondary = scan.options.model.secondary.map(|both| both.map(|v| json!({
+        "gamma_m2_s": v.circulation_m2_s, "y_m": v.lateral_position_m, "z_m": v.height_m, "core_m": v.core_radius_m,
+    })));
+    let tops = r.tops.iter();
+    let tops: Vec<Value> = tops
+        .map(|top| json!({ "wake": wake_json(&top.wake), "chi2": top.chi2 }))
+        .collect();
+    json!({
+        "scan": number, "file": scan.scan.path.to_string_lossy(), "sweep": scan.scan.sweep, "azimuth_rad": scan.scan.azimuth_rad,
+        "reference_time_s": r.reference_time_s, "vortices": vortices,
+        "wind_m_s": r.lateral_wind_m_s, "shear_per_s": r.wind_shear_per_s,
+        "chi2_per_dof": r.chi2_per_dof, "cells_used": r.cells_used, "cells_rejected": r.cells_rejected,
+        "statistic": r.statistic, "threshold": r.threshold, "flags": r.flags,
+        "parameters": parameters, "wake": r.wake.as_ref().map(wake_json), "covariance": covariance,
+        "secondary": secondary, "tops": tops,
+    })
+}
+
+/// The parameters of a wake by name. JSON has no NaN: what is not known is null.
+fn wake_json(wake: &Wake) -> Value {
+    let names = PARAMETER_NAMES.split(' ');
+    let named = names.zip(wake.to_array());
+    named
+        .map(|(name, value)| (name.to_owned(), json!(value)))
+        .collect()
+}
+
+fn vortex_json(vortex: &VortexResult) -> Value {
+    let mut object = json!({ "side": vortex.side, "time_s": vortex.time_s });
+    for (name, get) in VORTEX {
+        object[name] = json!(get(vortex));
+    }
+    object
 }
 
 /// Names of the parameters of a wake in their order.

@@ -7,7 +7,7 @@
 use crate::Error;
 use crate::plan::Plan;
 use crate::plan::wind::vortex_pair;
-use crate::scene::Flow;
+use crate::scene::{Flow, VortexPair};
 use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{Side, VortexResult};
 use wakescope_estimate::vortex_fit::{Vortex, Wake};
@@ -33,7 +33,6 @@ fn exact(
     [circulation, mean]: [f64; 2],
     core_m: Option<f64>,
 ) -> VortexResult {
-    let known = |value: f64| Measured { value, std: 0.0 };
     VortexResult {
         side,
         time_s,
@@ -43,6 +42,10 @@ fn exact(
         height_m: known(place_m.1),
         core_radius_m: core_m.map(known),
     }
+}
+
+fn known(value: f64) -> Measured {
+    Measured { value, std: 0.0 }
 }
 
 /// A vortex that is not there, since the aircraft has not passed yet.
@@ -63,38 +66,10 @@ pub(super) fn is_there(truth: &VortexResult) -> bool {
 /// A simulated flow in which no vortices are found; what the wind refuses.
 pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResult; 2], Error> {
     match &plan.scene().flow {
-        Flow::VortexPair(pair) => {
-            let air = vortex_pair(pair);
-            let profile = pair.profile;
-            // Behind an aircraft, the wake in the plane of the scan has its age there.
-            let x_m = plan.scene().scan.lidar.x_m;
-            let since_s = pair
-                .aircraft
-                .map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
-            let of = |side: Side| -> Result<VortexResult, Error> {
-                let centre = |time_s: f64| {
-                    let centres = air.centres(time_s + since_s);
-                    let y_m = if side == Side::Left {
-                        centres.left_y_m
-                    } else {
-                        centres.right_y_m
-                    };
-                    Ok((y_m, centres.height_m))
-                };
-                let mean_m2_s = pair.circulation_m2_s * profile.mean_5_15(pair.core_radius_m).0;
-                let passage = when_passed(plan, lines, centre)?;
-                if pair.aircraft.is_some() && passage.1 + since_s < 0.0 {
-                    return Ok(absent(side, passage.1));
-                }
-                Ok(exact(
-                    side,
-                    passage,
-                    [pair.circulation_m2_s, mean_m2_s],
-                    Some(pair.core_radius_m),
-                ))
-            };
-            Ok([of(Side::Left)?, of(Side::Right)?])
-        }
+        Flow::VortexPair(pair) => Ok([
+            of_pair(plan, lines, pair, Side::Left)?,
+            of_pair(plan, lines, pair, Side::Right)?,
+        ]),
         _ => Ok([
             simulated(plan, lines, Side::Left)?,
             simulated(plan, lines, Side::Right)?,
@@ -102,15 +77,48 @@ pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResul
     }
 }
 
+/// A vortex of an analytic pair.
+fn of_pair(
+    plan: &Plan,
+    lines: &[usize],
+    pair: &VortexPair,
+    side: Side,
+) -> Result<VortexResult, Error> {
+    let air = vortex_pair(pair);
+    // Behind an aircraft, the wake in the plane of the scan has its age there.
+    let x_m = plan.scene().scan.lidar.x_m;
+    let since_s = pair
+        .aircraft
+        .map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
+    let passage = when_passed(plan, lines, |time_s| {
+        let centres = air.centres(time_s + since_s);
+        let y_m = match side {
+            Side::Left => centres.left_y_m,
+            Side::Right => centres.right_y_m,
+        };
+        Ok((y_m, centres.height_m))
+    })?;
+    if pair.aircraft.is_some() && passage.1 + since_s < 0.0 {
+        return Ok(absent(side, passage.1));
+    }
+    let mean_m2_s = pair.circulation_m2_s * pair.profile.mean_5_15(pair.core_radius_m).0;
+    let circulations_m2_s = [pair.circulation_m2_s, mean_m2_s];
+    Ok(exact(
+        side,
+        passage,
+        circulations_m2_s,
+        Some(pair.core_radius_m),
+    ))
+}
+
 /// Both vortices as a wake; nothing in a simulated flow.
 pub(crate) fn true_wake(truth: &[VortexResult; 2]) -> Option<Wake> {
-    let vortex = |v: &VortexResult| Vortex {
+    let [left, right] = truth.each_ref().map(|v| Vortex {
         circulation_m2_s: v.circulation_m2_s.value,
         lateral_position_m: v.lateral_position_m.value,
         height_m: v.height_m.value,
         core_radius_m: v.core_radius_m.map_or(f64::NAN, |core| core.value),
-    };
-    let [left, right] = truth.each_ref().map(vortex);
+    });
     let wake = Wake {
         left,
         right,
@@ -128,20 +136,16 @@ fn when_passed(
 ) -> Result<Passage, Error> {
     let g = &plan.geometry;
     let lidar_m = plan.scene().scan.lidar_height_m;
-    let times_s = || {
-        lines
-            .iter()
-            .map(|line| plan.wind.start_s + g.line_time_s[*line])
-    };
-    let mut time_s = times_s().sum::<f64>() / lines.len().max(1) as f64;
+    let times_s = lines.iter();
+    let times_s = times_s.map(|line| plan.wind.start_s + g.line_time_s[*line]);
+    let mut time_s = times_s.sum::<f64>() / lines.len().max(1) as f64;
     let mut place_m = centre(time_s)?;
     for _ in 0..ROUNDS {
         let elevation_rad = (place_m.1 - lidar_m).atan2(place_m.0);
-        let away = |line: &usize| (g.elevation_rad[*line] - elevation_rad).abs();
-        let line = lines
-            .iter()
-            .copied()
-            .min_by(|a, b| away(a).total_cmp(&away(b)));
+        let line = lines.iter().copied().min_by(|a, b| {
+            let [a, b] = [a, b].map(|line| (g.elevation_rad[*line] - elevation_rad).abs());
+            a.total_cmp(&b)
+        });
         let next_s = plan.wind.start_s + line.map_or(0.0, |line| g.line_time_s[line]);
         if next_s == time_s {
             break;
@@ -154,20 +158,13 @@ fn when_passed(
 
 fn simulated(plan: &Plan, lines: &[usize], side: Side) -> Result<VortexResult, Error> {
     let sense = if side == Side::Left { -1.0 } else { 1.0 };
-    let centre = |time_s: f64| {
-        let [left, right] = [-1.0, 1.0].map(|sense| strongest(plan, time_s, sense));
-        let left = left?;
-        let right = right?;
+    let passage @ ((y_m, z_m), time_s) = when_passed(plan, lines, |time_s| {
+        let left = strongest(plan, time_s, -1.0)?;
+        let right = strongest(plan, time_s, 1.0)?;
         let reach_m = REACH_OVER_SPACING * (left.0 - right.0).hypot(left.1 - right.1);
-        centroid(
-            plan,
-            time_s,
-            if side == Side::Left { left } else { right },
-            sense,
-            reach_m,
-        )
-    };
-    let passage @ ((y_m, z_m), time_s) = when_passed(plan, lines, centre)?;
+        let first_m = if side == Side::Left { left } else { right };
+        centroid(plan, time_s, first_m, sense, reach_m)
+    })?;
     let mean_m2_s = mean_circulation_5_15_m2_s(plan.wind.wind(), [y_m, z_m], time_s, CIRCLE)?;
     Ok(exact(side, passage, [f64::NAN, sense * mean_m2_s], None))
 }
@@ -182,35 +179,33 @@ fn vorticity(
     (low_m, high_m): ((f64, f64), (f64, f64)),
     step_m: f64,
 ) -> Result<Vec<PlaceAndVorticity>, Error> {
-    let count = |low: f64, high: f64| ((high - low) / step_m).ceil().max(0.0) as usize + 1;
-    let columns = count(low_m.0, high_m.0);
-    let rows = count(low_m.1, high_m.1);
-    let place = |i: usize| {
-        (
-            low_m.0 + (i % columns) as f64 * step_m,
-            low_m.1 + (i / columns) as f64 * step_m,
-        )
-    };
-    let points_m: Vec<[f64; 3]> = (0..columns * rows)
-        .map(place)
-        .map(|(y, z)| [0.0, y, z])
-        .collect();
+    let columns = ((high_m.0 - low_m.0) / step_m).ceil().max(0.0) as usize + 1;
+    let rows = ((high_m.1 - low_m.1) / step_m).ceil().max(0.0) as usize + 1;
+    let mut points_m = Vec::with_capacity(columns * rows);
+    for row in 0..rows {
+        for column in 0..columns {
+            let y_m = low_m.0 + column as f64 * step_m;
+            points_m.push([0.0, y_m, low_m.1 + row as f64 * step_m]);
+        }
+    }
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
     plan.wind
         .wind()
         .velocity_into(&points_m, time_s, &mut velocity_m_s)?;
-    let of_row =
-        |row: usize| (1..columns.saturating_sub(1)).map(move |column| row * columns + column);
-    let value = |i: usize| {
-        let up = velocity_m_s[i + 1][2] - velocity_m_s[i - 1][2];
-        let across = velocity_m_s[i + columns][1] - velocity_m_s[i - columns][1];
-        (place(i), (up - across) / (2.0 * step_m))
-    };
-    let inner = (1..rows.saturating_sub(1)).flat_map(of_row);
-    Ok(inner
-        .map(value)
-        .filter(|(_, value)| value.is_finite())
-        .collect())
+    let mut known = Vec::new();
+    for row in 1..rows.saturating_sub(1) {
+        for column in 1..columns.saturating_sub(1) {
+            let i = row * columns + column;
+            let up = velocity_m_s[i + 1][2] - velocity_m_s[i - 1][2];
+            let across = velocity_m_s[i + columns][1] - velocity_m_s[i - columns][1];
+            let value = (up - across) / (2.0 * step_m);
+            if value.is_finite() {
+                let [_, y_m, z_m] = points_m[i];
+                known.push(((y_m, z_m), value));
+            }
+        }
+    }
+    Ok(known)
 }
 
 /// The place of the scan where the vorticity of a sign is strongest.
