@@ -40,7 +40,7 @@
 //! | [`wake_detection`] | whether a scan holds a wake: threshold for a rate of false alarms, smallest circulation that is found |
 //! | [`retrieval`] | from one scan of any instrument to its vortices, or none; tracks |
 //! | [`turbulence`] | spectra, covariances and structure functions of isotropic turbulence |
-//! | [`wind_profile`] | winds from beams in several directions: VAD with covariance, DBS |
+//! | [`wind_profile`] | winds from beams in several directions, among bad velocities; turbulence and the standard errors that it makes |
 //! | `matched_filter` | how well vortices at many positions explain a scan: for the test for a wake, and for first guesses of fits |
 //! | `linalg`, `parallel` | solve and eigenvectors with residual checks, the bundled LAPACK; loops on the caller's threads |
 //!

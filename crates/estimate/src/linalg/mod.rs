@@ -12,6 +12,7 @@ mod lapack;
 #[cfg(feature = "openblas-system")]
 mod openblas;
 pub(crate) mod positive_definite;
+pub(crate) mod tridiagonal;
 
 use ndarray::{Array1, Array2, ArrayView2, ShapeBuilder};
 use ndarray_linalg::{Eigh, Lapack, Scalar, UPLO};

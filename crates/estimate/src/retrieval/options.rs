@@ -31,12 +31,17 @@ impl Gate {
     /// and its circulation from its spacing.
     #[must_use]
     pub fn resolves(&self, spacing_m: f64) -> bool {
-        let std_m = match self {
+        self.std_m() < SHORT * spacing_m.min(TYPICAL_M)
+    }
+
+    /// Standard deviation of the weight along the line \[m\].
+    #[must_use]
+    pub fn std_m(&self) -> f64 {
+        match self {
             Self::Point => 0.0,
             Self::Gaussian { std_m } => *std_m,
             Self::Kernel(kernel) => kernel.width_m(),
-        };
-        std_m < SHORT * spacing_m.min(TYPICAL_M)
+        }
     }
 
     /// Refuses a weight that is wider than the scan: it shows nothing of a wake, and has more points than any memory.

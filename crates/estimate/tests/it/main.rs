@@ -25,4 +25,5 @@ mod vortex_fit;
 mod wake_detection;
 mod wind_aliases;
 mod wind_profile;
+mod wind_references;
 mod window_worth;
