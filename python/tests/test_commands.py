@@ -6,7 +6,7 @@ import sys
 import numpy
 import pytest
 import xarray
-from conftest import small
+from conftest import ROOT, small
 
 import wakescope
 
@@ -57,6 +57,15 @@ def test_detection_with_and_without_a_scan(scan):
     assert int(found.wake[0]) == 1 and found.attrs["smallest_detectable_m2_s"] > 0
     power = wakescope.detect(scene=small(), empty_scans=2000)
     assert power.detection.dims == ("gamma_m2_s",) and float(power.detection[-1]) > 0.9
+
+
+def test_a_wind_is_a_dataset_over_time_and_height():
+    folder = ROOT / "tests/reference/wind"
+    found = wakescope.wind(folder / "vad_turbulent.nc", gate_std=14.36)
+    assert found.eastward_wind.dims == ("time", "height") and found.sizes["time"] == 1
+    assert (found.eastward_wind_std.dropna("height") > 0).all() and float(found.edr.max()) < 1
+    stares = sorted(folder.glob("dbs_*.nc"))
+    assert wakescope.wind(stares, gate_std=14.36, every=600).northward_wind.notnull().any()
 
 
 def test_a_sweep_is_a_dataset_over_cases(tmp_path):

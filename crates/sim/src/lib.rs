@@ -33,6 +33,7 @@
 //! | [`measure`] | signals, velocities and their errors |
 //! | [`detection`] | whether scans hold a wake, at a rate of false alarms that is calibrated for them |
 //! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
+//! | [`wind`] | scans of any instrument: wind over height and turbulence |
 //! | [`mod@run`] | running a plan |
 //! | [`mod@write`] | writing the results of a run |
 //! | [`accuracy`] | numerical error and run time, setting by setting |
@@ -68,6 +69,7 @@ pub mod scene;
 mod stages;
 pub mod streams;
 pub mod sweep;
+pub mod wind;
 pub mod write;
 
 #[cfg(feature = "cli")]

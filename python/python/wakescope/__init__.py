@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Progress", "Result", "Scene", "WakescopeError", "__version__", "accuracy", "bound", "budget", "case", "check", "detect",
-    "efficiency", "estimate", "flow", "presets", "retrieve", "run", "scene", "sweep", "wake",
+    "efficiency", "estimate", "flow", "presets", "retrieve", "run", "scene", "sweep", "wake", "wind",
 ]  # fmt: skip
 
 Path_ = Union[str, "os.PathLike[str]"]
@@ -117,6 +117,12 @@ def detect(data: Scan | Sequence[Scan] = (), scene: Scene | None = None, **optio
     """Whether scans hold a wake; without scans how often wakes of each circulation are found in those of the scene."""
     result = _of_scans("detect", data, scene, options)
     return attributes(result["detection" if "detection" in result else "detection_power"], result.answer)
+
+
+def wind(data: Scan | Sequence[Scan], **options: Any) -> xarray.Dataset:
+    """Wind over time and height with standard errors, and turbulence, from scans of one lidar; `wind=[4.2, 4.2]` is that across a stare."""
+    result = _of_scans("wind", data, None, options)
+    return attributes(result["wind"], result.answer)
 
 
 def bound(scene: Scene, **options: Any) -> xarray.Dataset:

@@ -89,6 +89,13 @@ pub(super) struct ScanArgs {
     /// Scale factor of raw samples; the noise is then the scene's.
     #[arg(long, value_name = "A", value_parser = positive)]
     scale: Option<f64>,
+    #[command(flatten)]
+    velocities: VelocityArgs,
+}
+
+/// How velocities of files are read.
+#[derive(Debug, Args)]
+pub(super) struct VelocityArgs {
     /// Variable or column of the velocities.
     #[arg(long, value_name = "NAME")]
     field: Option<String>,
@@ -98,6 +105,17 @@ pub(super) struct ScanArgs {
     /// Skip velocities below this signal-to-noise ratio in dB.
     #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = finite)]
     min_snr: Option<f64>,
+}
+
+impl VelocityArgs {
+    pub(super) fn format(&self) -> ScanFormat {
+        ScanFormat {
+            field: self.field.clone(),
+            towards: self.towards,
+            min_snr_db: self.min_snr,
+            ignores_status: false,
+        }
+    }
 }
 
 /// What a file of scans holds.
@@ -129,12 +147,7 @@ impl ScanArgs {
         if is_signals(path) {
             return self.signals(path, scene, spectra, observer);
         }
-        let format = ScanFormat {
-            field: self.field.clone(),
-            towards: self.towards,
-            min_snr_db: self.min_snr,
-        };
-        let (maps, left_out) = scans::read(path, &format)?;
+        let (maps, left_out) = scans::read(path, &self.velocities.format())?;
         Ok(Scans {
             maps,
             left_out,
@@ -155,7 +168,7 @@ impl ScanArgs {
         };
         let mut records = recorded::open(path, &RawFormat::default(), &scene.content)?;
         records.scale = self.scale.unwrap_or(1.0);
-        records.is_reversed = self.towards;
+        records.is_reversed = self.velocities.towards;
         let (scene, is_own) = recorded::scene_of_records(scene.clone(), &records, observer)?;
         let plan = Plan::new(scene, Target::Map)?;
         if is_own && self.scale.is_some() {
@@ -289,6 +302,18 @@ pub(super) fn turbulence(word: &str) -> Result<Turbulence, String> {
         deviation_m_s,
         length_m,
     })
+}
+
+pub(super) fn horizontal_wind(word: &str) -> Result<(f64, f64), String> {
+    let allowed = "east and north in m/s with a comma between, from -200 to 200, e.g. 4.2,-1.5; or a wind.csv";
+    two(
+        word,
+        |(east, north): &(f64, f64)| {
+            let is_allowed = |speed: f64| (-200.0..=200.0).contains(&speed);
+            is_allowed(*east) && is_allowed(*north)
+        },
+        allowed,
+    )
 }
 
 pub(super) fn spacing(word: &str) -> Result<(f64, f64), String> {

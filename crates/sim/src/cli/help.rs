@@ -7,7 +7,10 @@ const GROUPS: [(&str, &[&str]); 4] = [
         "Simulate",
         &["run", "map", "signal", "efficiency", "flow", "wake"],
     ),
-    ("Estimate and retrieve", &["estimate", "retrieve", "detect"]),
+    (
+        "Estimate and retrieve",
+        &["estimate", "retrieve", "detect", "wind"],
+    ),
     ("Study", &["sweep", "accuracy", "bound", "budget"]),
     ("Set up", &["init", "check"]),
 ];

@@ -17,6 +17,7 @@ mod output;
 mod progress;
 mod retrieve;
 mod sweep;
+mod wind;
 
 use crate::flow::{EXAMPLES, WakePreset};
 use crate::io::Existing;
@@ -127,6 +128,8 @@ enum Command {
     },
     /// Detect wakes at a given false-alarm rate; report the smallest detectable circulation.
     Detect(detect::DetectArgs),
+    /// Find wind over height and turbulence from scans of any lidar.
+    Wind(wind::WindArgs),
     /// Run a scene with varied keys; tabulate and plot the results.
     Sweep {
         /// Scene file that all cases are based on.
@@ -266,6 +269,7 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
             overwrite,
         } => bound::budget(scene, range, out.as_deref(), *overwrite, cli),
         Command::Detect(args) => detect::detect(args, cli),
+        Command::Wind(args) => wind::wind(args, cli),
         Command::Sweep {
             scene,
             request,

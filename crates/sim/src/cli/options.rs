@@ -40,6 +40,19 @@ const NO_FILE: &str = "no file of scans is read";
 pub(super) const WITHOUT_SCENE: &Idle =
     &[("seed", "it replaces that of a scene: --scene states one")];
 
+/// Of winds, in which nothing is random.
+pub(super) const OF_WINDS: &Idle = &[("seed", "nothing in a wind is random")];
+
+/// Of winds whose beams show the wind across them.
+pub(super) const OF_FULL_WINDS: &Idle = &[(
+    "wind",
+    "the beams show the whole wind; it is for stares and scans of one azimuth",
+)];
+
+/// Of winds from files without a status of their velocities.
+pub(super) const WITHOUT_STATUS: &Idle =
+    &[("use-status", "no file says which velocities it trusts")];
+
 /// On an array in the memory of the program that runs the command.
 pub(super) const IN_MEMORY: &Idle = &[
     ("format", ARRAY),

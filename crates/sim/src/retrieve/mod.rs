@@ -23,7 +23,7 @@ mod table;
 mod truth;
 
 pub use envelope::{envelope_table, envelopes};
-pub use one_scan::{gate_of, options, retrieve_map, scene_of};
+pub use one_scan::{gate_of, gate_of_instrument, options, retrieve_map, scene_in_file, scene_of};
 
 pub use own::{retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]

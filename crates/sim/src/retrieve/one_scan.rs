@@ -10,6 +10,7 @@ use crate::plan::instrument::Instrument;
 use crate::progress::Observer;
 use crate::scene::{RetrievalMethod as Method, Scene, SceneFile};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
+use std::path::Path;
 use wakescope_estimate::retrieval::{
     Gate, RetrievalOptions, ScanFit, Velocities, fit_scan, radial_velocity_method,
     without_implausible_vortices,
@@ -39,10 +40,23 @@ pub fn gate_of(
     scene: Option<&Scene>,
 ) -> Result<(Gate, Option<&'static str>), Error> {
     let pulse_width_s = scan.and_then(|scan| scan.pulse_width_s);
+    let gate_length_m = scan.and_then(|scan| scan.gate_length_m);
+    gate_of_instrument(pulse_width_s, gate_length_m, stated_m, scene)
+}
+
+/// The gate of an instrument: as stated, else of the scene, else of its pulse and the length of its gates; points if nothing is known,
+/// with the remedy.
+///
+/// # Errors
+/// As [`gate_of`].
+pub fn gate_of_instrument(
+    pulse_width_s: Option<f64>,
+    gate_length_m: Option<f64>,
+    stated_m: Option<f64>,
+    scene: Option<&Scene>,
+) -> Result<(Gate, Option<&'static str>), Error> {
     let pulse_m = pulse_width_s.map(|width_s| 0.5 * SPEED_OF_LIGHT_M_S * width_s / WIDTH_OVER_STD);
-    let window_m = scan
-        .and_then(|scan| scan.gate_length_m)
-        .map(|length_m| length_m / 12f64.sqrt());
+    let window_m = gate_length_m.map(|length_m| length_m / 12f64.sqrt());
     Ok(match (stated_m, scene, pulse_m, window_m) {
         (Some(std_m), ..) => (of_std(std_m), None),
         (None, Some(scene), ..) => (of_scene(scene)?, None),
@@ -77,11 +91,23 @@ fn of_scene(scene: &Scene) -> Result<Gate, Error> {
 /// # Errors
 /// A scene that this program does not read, with the key and the remedy.
 pub fn scene_of(scan: &ReadScan, observer: &dyn Observer) -> Result<Option<SceneFile>, Error> {
-    let Some(toml) = &scan.scene_toml else {
+    scene_in_file(&scan.path, scan.scene_toml.as_deref(), observer)
+}
+
+/// The scene of this program that a file has as a text; the observer is warned of keys that are skipped.
+///
+/// # Errors
+/// As [`scene_of`].
+pub fn scene_in_file(
+    path: &Path,
+    toml: Option<&str>,
+    observer: &dyn Observer,
+) -> Result<Option<SceneFile>, Error> {
+    let Some(toml) = toml else {
         return Ok(None);
     };
-    let (scene, warning) = SceneFile::embedded(toml, &scan.path).map_err(|error| Error::Input {
-        path: scan.path.clone(),
+    let (scene, warning) = SceneFile::embedded(toml, path).map_err(|error| Error::Input {
+        path: path.to_owned(),
         reason: format!(
             "the scene in it is none that this program reads: {error}; --scene states another"
         ),
@@ -152,7 +178,6 @@ pub fn retrieve_map(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
     use wakescope_estimate::retrieval::ScanMap;
 
     #[test]

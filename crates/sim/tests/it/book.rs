@@ -253,6 +253,7 @@ fn options_that_pages_name_exist() {
         "estimate",
         "retrieve",
         "detect",
+        "wind",
         "sweep",
         "bound",
         "budget",

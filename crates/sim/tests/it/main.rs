@@ -39,6 +39,8 @@ mod simulated_flow;
 mod sweep;
 #[cfg(feature = "cli")]
 mod wake;
+#[cfg(all(feature = "cli", feature = "plots"))]
+mod wind;
 
 /// The program, run in a folder.
 #[cfg(feature = "cli")]

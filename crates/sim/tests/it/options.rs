@@ -206,6 +206,13 @@ const KINDS: &[Kind] = &[
         "table.csv --turbulence 0.5,25 --out out",
         &["secondary"],
     ),
+    all("wind", "fan.csv --out out"),
+    some(
+        "wind",
+        "o/map.nc --out out",
+        &["kind", "every", "wind", "seed"],
+    ),
+    some("wind", "halo/halo.hpl --out out", &["field", "towards"]),
     all("bound", "tiny.toml"),
     all("bound", "tiny.toml --out bound.csv"),
     all("budget", "tiny.toml"),
@@ -308,6 +315,12 @@ fn value(command: &str, option: &str) -> Option<&'static [&'static str]> {
         (_, "lidar-height") => &["2"],
         (_, "field") => &["sigma_m_s"],
         (_, "min-snr") => &["99"],
+        (_, "kind") => &["up"],
+        (_, "every") => &["7"],
+        (_, "height-step") => &["40"],
+        (_, "layer") => &["50"],
+        (_, "outer-scale") => &["50"],
+        (_, "wind") => &["4.2,4.2"],
         (_, "range") => &["400"],
         (_, "false-alarm") => &["0.1"],
         (_, "spacing") => &["20,40"],
@@ -326,7 +339,7 @@ fn value(command: &str, option: &str) -> Option<&'static [&'static str]> {
         (
             _,
             "complex" | "towards" | "spectra" | "pairs-only" | "independent" | "no-circulation"
-            | "print" | "check" | "overwrite" | "force" | "restart" | "resume",
+            | "print" | "check" | "overwrite" | "force" | "restart" | "resume" | "use-status",
         ) => &[],
         _ => return None,
     })
@@ -351,6 +364,30 @@ fn files(folder: &Path) -> Files {
         }
     }
     found
+}
+
+/// A cone with two vertical beams, some velocities flagged, in noise and turbulence of a kind.
+fn fan() -> String {
+    let mut text = String::from(
+        "time_s,azimuth_deg,elevation_deg,range_m,velocity_m_s,sigma_m_s,snr_db,flagged\n",
+    );
+    for beam in 0..14 {
+        for gate in 0..12 {
+            let azimuth_deg = 30.0 * f64::from(beam);
+            let elevation_deg = if beam < 12 { 60.0 } else { 90.0 };
+            let (sin, cos) = f64::to_radians(azimuth_deg).sin_cos();
+            let level = f64::to_radians(elevation_deg).cos();
+            let ripple = 0.4 * (2.3 * f64::from(beam) + 0.7 * f64::from(gate)).sin()
+                + 0.2 * f64::from(beam * 31 + gate * gate * 7).sin();
+            let velocity_m_s = level * (5.0 * sin + 2.0 * cos) + ripple;
+            let range_m = 100 + 30 * gate;
+            let flagged = u8::from(beam == 3);
+            text += &format!(
+                "{beam},{azimuth_deg},{elevation_deg},{range_m},{velocity_m_s},0.3,{gate},{flagged}\n"
+            );
+        }
+    }
+    text
 }
 
 /// A folder with every kind of input.
@@ -386,6 +423,7 @@ fn inputs() -> TempDir {
         few.replace("gate_step_samples = 16", "gate_step_samples = 32")
             .as_bytes(),
     );
+    write("fan.csv", fan().as_bytes());
     write("cases.csv", b"scan.lidar_height_m\n4\n5\n");
     for line in [
         "run s.toml --out o",

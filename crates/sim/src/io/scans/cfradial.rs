@@ -5,6 +5,7 @@
 //! files without Nyquist velocity, with ragged gates, another sign, several sweeps.
 
 use super::grid::{RayRow, mean_count, of_mean, scan_map};
+use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::netcdf_input::NetcdfFile;
 use crate::io::units::Quantity;
@@ -33,10 +34,7 @@ pub(super) fn scans(
     let rays = Rays::read(file, format, &velocity, range_m.len())?;
     let pulse_width_s = pulse_width(file)?;
     let place_deg = place(file)?;
-    let scene_toml = file
-        .global_text("scene")
-        .or_else(|| file.text(&velocity.name, "scene"))
-        .or_else(|| file.text(&velocity.name, "instrument"));
+    let scene_toml = scene_of(file, &velocity);
     let is_own = file
         .global_text("source")
         .is_some_and(|source| source.starts_with("wakescope "));
@@ -66,7 +64,7 @@ pub(super) fn scans(
                         azimuth_rad: scan.azimuth_rad,
                         place_deg,
                         reference: rays.reference,
-                        gate_length_m: range_m.get(1).map(|second_m| second_m - range_m[0]),
+                        gate_length_m: gate_length_m(&range_m),
                         pulse_width_s,
                         scene_toml: scene_toml.map(str::to_owned),
                         is_own,
@@ -78,6 +76,112 @@ pub(super) fn scans(
         }
     }
     Ok(found)
+}
+
+/// The rays of a file or a group, sweep by sweep; `sweep` is the number of its first sweep.
+pub(super) fn rays(
+    file: &NetcdfFile,
+    path: &Path,
+    format: &ScanFormat,
+    sweep: usize,
+) -> Result<FoundRays, String> {
+    let (_, elevation_rad) =
+        variable::elevations_rad(file)?.ok_or("it has no variable elevation")?;
+    let ranges_m = ray_ranges(file, elevation_rad.len())?;
+    let velocity = VelocityVariable::new(file, format)?;
+    let gates = ranges_m.first().map_or(0, Vec::len);
+    let rays = Rays::read(file, format, &velocity, gates)?;
+    let place_deg = standing_place(file)?;
+    let pulse_width_s = pulse_width(file)?;
+    let scene_toml = scene_of(file, &velocity).map(str::to_owned);
+    let mut sweeps = Vec::with_capacity(rays.sweeps.len());
+    for (number, range) in rays.sweeps.into_iter().enumerate() {
+        let mut own = Vec::with_capacity(range.len());
+        for ray in range.filter(|ray| rays.is_still[*ray]) {
+            let row = &rays.rows[ray];
+            let fold_m_s = rays.fold_m_s[ray];
+            own.push(Ray {
+                azimuth_rad: row.azimuth_rad,
+                elevation_rad: row.elevation_rad,
+                time_s: row.time_s,
+                range_m: ranges_m[ray.min(ranges_m.len() - 1)].clone(),
+                velocity_m_s: row.velocity_m_s.clone(),
+                sigma_m_s: row.sigma_m_s.clone(),
+                fold_m_s: (fold_m_s > 0.0 && fold_m_s.is_finite()).then_some(fold_m_s),
+            });
+        }
+        sweeps.push(RaySweep {
+            path: path.to_owned(),
+            sweep: sweep + number,
+            place_deg,
+            reference: rays.reference,
+            gate_length_m: gate_length_m(&ranges_m[0]),
+            pulse_width_s,
+            scene_toml: scene_toml.clone(),
+            has_status: file.has(STATUS) || file.has("flagged"),
+            gate_stride: 1,
+            rays: own,
+        });
+    }
+    Ok((sweeps, rays.warnings))
+}
+
+/// The scene of a file of this program, whole or what other programs left of it.
+fn scene_of<'f>(file: &'f NetcdfFile, velocity: &VelocityVariable) -> Option<&'f str> {
+    file.global_text("scene")
+        .or_else(|| file.text(&velocity.name, "scene"))
+        .or_else(|| file.text(&velocity.name, "instrument"))
+}
+
+/// Distance of the first two gates, m.
+fn gate_length_m(range_m: &[f64]) -> Option<f64> {
+    range_m.get(1).map(|second_m| second_m - range_m[0])
+}
+
+/// Ranges of the gates, m: those of all rays, or of each ray.
+fn ray_ranges(file: &NetcdfFile, rays: usize) -> Result<Vec<Vec<f64>>, String> {
+    let refused = match ranges(file) {
+        Ok(common_m) if !common_m.is_empty() => return Ok(vec![common_m]),
+        Ok(_) => return Err("variable range has no value".into()),
+        Err(reason) => reason,
+    };
+    let name = variable::find(file, &RANGE).ok_or("it has no variable range")?;
+    let range_m = variable::values(file, name, Quantity::Length)?;
+    match file.shape(name).as_deref() {
+        Some([first, gates]) if *first == rays as u64 && *gates > 0 => {
+            let rows = range_m.chunks_exact(*gates as usize);
+            Ok(rows.map(<[f64]>::to_vec).collect())
+        }
+        _ => Err(refused),
+    }
+}
+
+/// Latitude and longitude of an instrument, degrees, if the file has them.
+///
+/// # Errors
+/// An instrument that moves.
+fn standing_place(file: &NetcdfFile) -> Result<Option<[f64; 2]>, String> {
+    let mut place_deg = [f64::NAN; 2];
+    for (name, place_deg) in ["latitude", "longitude"].into_iter().zip(&mut place_deg) {
+        if !file.has(name) {
+            continue;
+        }
+        let values = file.floats(name)?;
+        let (low, high) = values
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+                (a.min(*v), b.max(*v))
+            });
+        if high - low > planes::SAME_PLACE_DEG {
+            return Err(format!(
+                "its lidar moves, {name} from {low} to {high} degrees: winds are found from lidars that stand still"
+            ));
+        }
+        *place_deg = values.first().copied().unwrap_or(f64::NAN);
+    }
+    Ok((place_deg[0] + place_deg[1])
+        .is_finite()
+        .then_some(place_deg))
 }
 
 /// Whether a file or a group has rays.
@@ -209,10 +313,14 @@ fn velocities_m_s(
         &velocity.name,
         variable::values(file, &velocity.name, Quantity::Velocity)?,
     )?;
+    let status_of = |name: &str| match format.ignores_status {
+        true => Ok(None),
+        false => layout.optional(file, name),
+    };
     // A fraction of realisations, or 0 and 1.
-    let flagged = layout.optional(file, "flagged")?;
+    let flagged = status_of("flagged")?;
     // 1 where the instrument trusts its velocity.
-    let status = layout.optional(file, STATUS)?;
+    let status = status_of(STATUS)?;
     let ratio_db = match (format.min_snr_db, variable::find(file, &RATIO)) {
         (None, _) => None,
         (Some(_), Some(name)) => Some(layout.spread(name, variable::ratio_db(file, name)?)?),

@@ -5,6 +5,7 @@
 //! Check: a map written by this program comes back; each dialect; files that are cut short.
 
 use super::grid::{RayRow, scan_map};
+use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::UtcTime;
 use crate::io::utc::DAY_S;
@@ -31,8 +32,15 @@ struct Header {
     not_understood: Option<String>,
 }
 
-/// The scans of a text.
-pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Found, String> {
+/// What a text holds before its rays are put into scans.
+struct Parsed<'t> {
+    head: Vec<&'t str>,
+    header: Header,
+    rays: Vec<RayRow>,
+    range_m: Vec<f64>,
+}
+
+fn parse<'t>(text: &'t str, format: &ScanFormat) -> Result<Parsed<'t>, String> {
     let mut lines = text.lines().enumerate();
     let mut head = Vec::new();
     for (_, line) in lines.by_ref() {
@@ -55,6 +63,57 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
     for gate in 0..header.gates {
         range_m.push(0.5 * header.gate_length_m + gate as f64 * header.gate_step_m);
     }
+    Ok(Parsed {
+        head,
+        header,
+        rays,
+        range_m,
+    })
+}
+
+/// The rays of a text.
+pub(super) fn rays_of_text(
+    text: &str,
+    path: &Path,
+    format: &ScanFormat,
+) -> Result<FoundRays, String> {
+    let Parsed {
+        header,
+        rays: rows,
+        range_m,
+        ..
+    } = parse(text, format)?;
+    let mut rays = Vec::with_capacity(rows.len());
+    for row in rows {
+        rays.push(Ray {
+            azimuth_rad: row.azimuth_rad,
+            elevation_rad: row.elevation_rad,
+            time_s: row.time_s,
+            range_m: range_m.clone(),
+            velocity_m_s: row.velocity_m_s,
+            ..Ray::default()
+        });
+    }
+    let sweep = RaySweep {
+        path: path.to_owned(),
+        reference: header.midnight,
+        gate_length_m: Some(header.gate_length_m),
+        has_status: true,
+        gate_stride: (header.gate_length_m / header.gate_step_m - 1e-6).ceil() as usize,
+        rays,
+        ..RaySweep::default()
+    };
+    Ok((vec![sweep], header.not_understood.into_iter().collect()))
+}
+
+/// The scans of a text.
+pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Found, String> {
+    let Parsed {
+        head,
+        header,
+        rays,
+        range_m,
+    } = parse(text, format)?;
     let (scans, skipped) = planes::in_order(rays)?;
     let mut found = Found {
         skipped,
@@ -239,12 +298,14 @@ fn noise_deviation(intensities: &[Vec<f64>]) -> f64 {
 fn mask_noise(rays: &mut [RayRow], intensities: &[Vec<f64>], format: &ScanFormat) {
     let least = match format.min_snr_db {
         Some(db) => 1.0 + 10f64.powf(0.1 * db),
+        None if format.ignores_status => f64::NEG_INFINITY,
         None => 1.0 + SIGMAS_ABOVE_NOISE * noise_deviation(intensities),
     };
     for (ray, intensity) in rays.iter_mut().zip(intensities) {
         for (velocity, intensity) in ray.velocity_m_s.iter_mut().zip(intensity) {
-            // This program writes intensity 1 where there is none.
-            *velocity = if *intensity > 1.0 && *intensity >= least {
+            // This program writes intensity 1 where there is none, others below 1 where there is noise.
+            let is_signal = *intensity > 1.0 || (format.ignores_status && *intensity != 1.0);
+            *velocity = if is_signal && *intensity >= least {
                 format.sign() * *velocity
             } else {
                 f64::NAN

@@ -12,9 +12,11 @@ mod cfradial;
 mod grid;
 mod hpl;
 mod planes;
+mod rays;
 mod table;
 
 pub use planes::{are_of_one_plane, face_alike, plane_numbers};
+pub use rays::{Ray, RaySweep, read_rays};
 
 use crate::Error;
 use crate::io::netcdf_input::open_groups;
@@ -32,6 +34,8 @@ pub struct ScanFormat {
     pub towards: bool,
     /// Least signal-to-noise ratio, dB, where the file has one.
     pub min_snr_db: Option<f64>,
+    /// Whether velocities that the instrument does not trust are read all the same.
+    pub ignores_status: bool,
 }
 
 impl ScanFormat {
@@ -192,17 +196,32 @@ fn netcdf(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
 }
 
 fn text(path: &Path, length: u64, format: &ScanFormat) -> Result<Found, Error> {
+    let bytes = text_bytes(path, length)?;
+    scans_of_text(&bytes, path, format).map_err(|reason| Error::input(path, reason))
+}
+
+/// The bytes of a text that is not too large.
+fn text_bytes(path: &Path, length: u64) -> Result<Vec<u8>, Error> {
     if length > LARGEST_TEXT_BYTES {
         return Err(Error::input(
             path,
             format!("it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read"),
         ));
     }
-    let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
-    scans_of_text(&bytes, path, format).map_err(|reason| Error::input(path, reason))
+    std::fs::read(path).map_err(Error::io("read", path))
 }
 
 fn scans_of_text(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<Found, String> {
+    let (text, is_hpl) = decoded(bytes)?;
+    match is_hpl {
+        true if format.field.is_some() => Err(NO_FIELD.into()),
+        true => hpl::scans(&text, path, format),
+        false => table::scans(&text, path, format),
+    }
+}
+
+/// A text, and whether it is a HALO file.
+fn decoded(bytes: &[u8]) -> Result<(String, bool), String> {
     // The text, and a text of its own for each cell.
     let cells = bytes
         .iter()
@@ -216,14 +235,11 @@ fn scans_of_text(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<Found
         .lines()
         .take(60)
         .any(|line| line.trim_start().starts_with("****"));
-    match is_hpl {
-        true if format.field.is_some() => {
-            Err("--field has no effect: a HALO file has one column of velocities".into())
-        }
-        true => hpl::scans(&text, path, format),
-        false => table::scans(&text, path, format),
-    }
+    Ok((text, is_hpl))
 }
+
+/// What is said of a variable of velocities in a file that has one column of them.
+const NO_FIELD: &str = "--field has no effect: a HALO file has one column of velocities";
 
 /// Largest text that is read \[bytes\].
 const LARGEST_TEXT_BYTES: u64 = 1 << 30;

@@ -19,7 +19,7 @@ const SPREAD_RAD: f64 = 0.03;
 /// scanned on purpose are a degree apart.
 const SAME_PLANE_RAD: f64 = 0.01;
 /// Latitudes and longitudes of one place agree to this, degrees: some ten metres, to which receivers of satellites repeat.
-const SAME_PLACE_DEG: f64 = 2e-4;
+pub(super) const SAME_PLACE_DEG: f64 = 2e-4;
 /// A scan extends farther in elevation than across its plane, by this factor: where azimuth and elevation turn together there is no plane.
 const FLATNESS: f64 = 3.0;
 /// The azimuth says nothing where the cosine of the elevation is smaller.
@@ -27,7 +27,7 @@ const NEAR_ZENITH: f64 = 0.05;
 /// Fraction of a scan's elevations that a line must go back for another scan to begin.
 const TURN: f64 = 0.1;
 /// Elevations of a scan, with rounding, rad: beyond the zenith it looks to the other side.
-const ALLOWED_RAD: std::ops::RangeInclusive<f64> = -FRAC_PI_2 - 1e-6..=PI + 1e-6;
+pub(super) const ALLOWED_RAD: std::ops::RangeInclusive<f64> = -FRAC_PI_2 - 1e-6..=PI + 1e-6;
 /// Fraction of the rays whose elevations may be impossible; more say that the unit is another one.
 const IMPOSSIBLE: f64 = 0.1;
 /// An elevation is isolated if it is this many usual steps away from those before and after it, which are a few steps apart.

@@ -3,6 +3,7 @@
 //! Check: maps of a run, references, cells that are missing, twice there, or make no grid.
 
 use super::grid::{RayRow, mean_count, of_mean, scan_map};
+use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::csv_input::TextTable;
 use crate::io::netcdf_input::quoted;
@@ -35,9 +36,7 @@ struct TableVelocity {
 /// The scans of a table.
 pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Found, String> {
     let table = TextTable::parse(text)?;
-    // Programs that write it again keep the names of its columns.
-    let is_own =
-        table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some();
+    let is_own = is_own(&table);
     let columns = Columns::new(&table, format, is_own)?;
     let mut sweeps: BTreeMap<u64, Vec<TableVelocity>> = BTreeMap::new();
     let mut without_elevation = 0;
@@ -82,6 +81,70 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
     }
     found.warnings.extend(columns.times.not_understood);
     Ok(found)
+}
+
+/// The rays of a table, sweep by sweep: rows of one direction and time that follow each other are one ray.
+pub(super) fn rays_of_text(
+    text: &str,
+    path: &Path,
+    format: &ScanFormat,
+) -> Result<FoundRays, String> {
+    let table = TextTable::parse(text)?;
+    let is_own = is_own(&table);
+    let columns = Columns::new(&table, format, is_own)?;
+    if columns.azimuth_rad.is_none() {
+        return Err(missing_column(&table, "azimuth_rad"));
+    }
+    let scene_toml = Some(table.origin().scene_toml).filter(|text| !text.is_empty());
+    let mut sweeps: BTreeMap<u64, RaySweep> = BTreeMap::new();
+    for row in 0..table.rows.len() {
+        let sweep = columns.sweep(row)?;
+        let Some(found) = columns.velocity(row)? else {
+            continue;
+        };
+        let own = sweeps.entry(sweep).or_insert_with(|| RaySweep {
+            path: path.to_owned(),
+            sweep: sweep as usize,
+            reference: columns.times.reference,
+            scene_toml: scene_toml.clone(),
+            has_status: columns.flagged.is_some(),
+            gate_stride: 1,
+            ..RaySweep::default()
+        });
+        let is_same_ray = own.rays.last().is_some_and(|ray| {
+            let is_farther = ray
+                .range_m
+                .last()
+                .is_some_and(|last_m| found.range_m > *last_m);
+            let is_same_time = ray.time_s.to_bits() == found.time_s.to_bits();
+            let is_same_direction =
+                ray.azimuth_rad == found.azimuth_rad && ray.elevation_rad == found.elevation_rad;
+            is_farther && is_same_time && is_same_direction
+        });
+        if !is_same_ray {
+            own.rays.push(Ray {
+                azimuth_rad: found.azimuth_rad,
+                elevation_rad: found.elevation_rad,
+                time_s: found.time_s,
+                ..Ray::default()
+            });
+        }
+        if let Some(ray) = own.rays.last_mut() {
+            ray.range_m.push(found.range_m);
+            ray.velocity_m_s.push(found.velocity_m_s);
+            ray.sigma_m_s.extend(found.sigma_m_s);
+        }
+    }
+    if sweeps.is_empty() {
+        return Err("it has a header and no rows with an elevation".into());
+    }
+    let sweeps = sweeps.into_values().collect();
+    Ok((sweeps, columns.times.not_understood.into_iter().collect()))
+}
+
+/// Whether this program wrote a table. Programs that write it again keep the names of its columns.
+fn is_own(table: &TextTable) -> bool {
+    table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some()
 }
 
 /// The columns of a table that a scan needs, in SI.
@@ -219,8 +282,8 @@ impl<'t> Columns<'t> {
         {
             return true;
         }
-        self.flagged
-            .is_some_and(|column| self.table.number(row, column) > 0.5)
+        let flagged = self.flagged.filter(|_| !self.format.ignores_status);
+        flagged.is_some_and(|column| self.table.number(row, column) > 0.5)
     }
 }
 

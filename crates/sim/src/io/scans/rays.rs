@@ -1,0 +1,180 @@
+//! Lines of sight of files as they were measured, in any directions, for winds: with the formats, units and signs of scans, but without
+//! the demand that they make a scan in elevation.
+//!
+//! Check: files of all formats with cones, stares and gates that differ from ray to ray; what no ray of a lidar has.
+
+use super::planes::ALLOWED_RAD;
+use super::{ScanFormat, cfradial, hpl, table};
+use crate::Error;
+use crate::io::netcdf_input::open_groups;
+use crate::io::{UtcTime, text_file};
+use std::path::{Path, PathBuf};
+
+/// Velocities that no air has, m/s: their unit is another one, or a fill value was not named.
+const FASTEST_M_S: f64 = 500.0;
+/// Farthest range of a gate, m: that of a scene.
+const FARTHEST_M: f64 = 1e6;
+/// Fraction of the rays whose elevations may be impossible; more say that the unit is another one.
+const IMPOSSIBLE: f64 = 0.1;
+
+/// Cosine of the elevation below which a beam counts as vertical.
+const VERTICAL: f64 = 0.02;
+
+/// One line of sight with the velocities of its gates.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Ray {
+    /// Azimuth, rad, clockwise from north.
+    pub azimuth_rad: f64,
+    /// Elevation, rad, up to pi: beyond a right angle it looks to the other side.
+    pub elevation_rad: f64,
+    /// Time of its middle, s; NaN if it is unknown.
+    pub time_s: f64,
+    /// Ranges of its gates, m.
+    pub range_m: Vec<f64>,
+    /// Velocities of its gates, m/s, positive away; NaN where there is none.
+    pub velocity_m_s: Vec<f64>,
+    /// Their standard deviations, m/s; empty if they are unknown.
+    pub sigma_m_s: Vec<f64>,
+    /// Velocities repeat after this width, m/s.
+    pub fold_m_s: Option<f64>,
+}
+
+impl Ray {
+    /// Unit vector of the beam: east, north, up.
+    #[must_use]
+    pub fn direction(&self) -> [f64; 3] {
+        let (east, north) = self.azimuth_rad.sin_cos();
+        let (up, level) = self.elevation_rad.sin_cos();
+        [level * east, level * north, up]
+    }
+}
+
+/// Lines of sight of one sweep of a file, in the order in which they were measured.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RaySweep {
+    /// The file.
+    pub path: PathBuf,
+    /// Number of the sweep in the file, from 0.
+    pub sweep: usize,
+    /// Latitude and longitude of the instrument, degrees, if the file has them.
+    pub place_deg: Option<[f64; 2]>,
+    /// Date from which times count, if the file has one.
+    pub reference: Option<UtcTime>,
+    /// Length of a gate that touches its neighbours, m, if the file says so.
+    pub gate_length_m: Option<f64>,
+    /// Duration of a pulse, s, if the file has it.
+    pub pulse_width_s: Option<f64>,
+    /// The scene that this program wrote the file for.
+    pub scene_toml: Option<String>,
+    /// Whether the file says which velocities its instrument trusts.
+    pub has_status: bool,
+    /// Gates this many apart share no samples, by the file: more than 1 for gates that overlap.
+    pub gate_stride: usize,
+    /// The lines of sight.
+    pub rays: Vec<Ray>,
+}
+
+/// The sweeps of a file or a group of it, and what was not understood.
+pub(super) type FoundRays = (Vec<RaySweep>, Vec<String>);
+
+/// Reads the lines of sight of a file; the texts say what was skipped or not understood.
+///
+/// # Errors
+/// A file that cannot be read, is damaged or cut short, or has no velocity; a lidar that moves; numbers that no ray has.
+pub fn read_rays(path: &Path, format: &ScanFormat) -> Result<(Vec<RaySweep>, Vec<String>), Error> {
+    let (_, length, magic) = text_file::begin(path)?;
+    let (mut sweeps, mut notes) = match &magic[..] {
+        [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => netcdf(path, format)?,
+        _ => {
+            let bytes = super::text_bytes(path, length)?;
+            of_text(&bytes, path, format).map_err(|reason| Error::input(path, reason))?
+        }
+    };
+    let skipped = check(&mut sweeps).map_err(|reason| Error::input(path, reason))?;
+    notes.extend(skipped);
+    Ok((sweeps, notes))
+}
+
+fn netcdf(path: &Path, format: &ScanFormat) -> Result<FoundRays, Error> {
+    let mut sweeps = Vec::new();
+    let mut notes = Vec::new();
+    let groups = open_groups(path, "elevation", cfradial::has_rays)?;
+    for (number, group) in groups.into_iter().enumerate() {
+        let found = cfradial::rays(&group, path, format, number);
+        let (own, warnings) = found.map_err(|reason| group.refuse(reason))?;
+        sweeps.extend(own);
+        notes.extend(warnings);
+    }
+    Ok((sweeps, notes))
+}
+
+fn of_text(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<FoundRays, String> {
+    let (text, is_hpl) = super::decoded(bytes)?;
+    match is_hpl {
+        true if format.field.is_some() => Err(super::NO_FIELD.into()),
+        true => hpl::rays_of_text(&text, path, format),
+        false => table::rays_of_text(&text, path, format),
+    }
+}
+
+/// Removes what no line of sight has, in words; elevations below the horizon may count on from 270 degrees.
+fn check(sweeps: &mut [RaySweep]) -> Result<Option<String>, String> {
+    let all: usize = sweeps.iter().map(|sweep| sweep.rays.len()).sum();
+    let mut impossible = None;
+    let mut count = 0;
+    for sweep in sweeps.iter_mut() {
+        for ray in &mut sweep.rays {
+            if ray.elevation_rad > 1.5 * std::f64::consts::PI {
+                ray.elevation_rad -= std::f64::consts::TAU;
+            }
+            // Straight up all azimuths are one.
+            if ray.azimuth_rad.is_nan() && ray.elevation_rad.cos().abs() < VERTICAL {
+                ray.azimuth_rad = 0.0;
+            }
+            if ray.elevation_rad.is_finite() && !ALLOWED_RAD.contains(&ray.elevation_rad) {
+                impossible = impossible.or(Some(ray.elevation_rad));
+                count += 1;
+            }
+        }
+        sweep
+            .rays
+            .retain(|ray| ALLOWED_RAD.contains(&ray.elevation_rad) && ray.azimuth_rad.is_finite());
+    }
+    if let Some(elevation_rad) = impossible
+        && f64::from(count) > (IMPOSSIBLE * all as f64).max(1.0)
+    {
+        return Err(format!(
+            "elevation is {} degrees: from -90 to 180 are allowed, beyond 90 to the other side",
+            elevation_rad.to_degrees()
+        ));
+    }
+    let kept: usize = sweeps.iter().map(|sweep| sweep.rays.len()).sum();
+    let mut velocities = 0;
+    for ray in sweeps.iter().flat_map(|sweep| &sweep.rays) {
+        for (range_m, velocity_m_s) in ray.range_m.iter().zip(&ray.velocity_m_s) {
+            if velocity_m_s.abs() > FASTEST_M_S {
+                return Err(format!(
+                    "a velocity is {velocity_m_s} m/s: its unit must be m/s, and a missing one its fill value"
+                ));
+            }
+            if range_m.is_finite() && !(0.0..=FARTHEST_M).contains(range_m) {
+                return Err(format!(
+                    "range is {range_m} m: from 0 to {FARTHEST_M} m are read"
+                ));
+            }
+            velocities += usize::from(range_m.is_finite() && velocity_m_s.is_finite());
+        }
+    }
+    if kept == 0 {
+        return Err("it has no ray with an azimuth and an elevation".into());
+    }
+    if velocities == 0 {
+        return Err("all of its velocities are missing".into());
+    }
+    Ok((kept < all).then(|| {
+        format!(
+            "{} of {all} rays have no azimuth, or no elevation from -90 to 180 degrees: skipped",
+            all - kept
+        )
+    }))
+}

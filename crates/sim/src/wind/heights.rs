@@ -1,0 +1,332 @@
+//! Winds over height in one window: bins of height, and in each the most likely wind among bad velocities.
+//!
+//! Check: `wind` in the tests of the program.
+
+use super::WindOptions;
+use super::directions::{Components, Determined, dot};
+use crate::Error;
+use crate::io::scans::Ray;
+use ndarray::{Array2, s};
+use wakescope_estimate::wind_profile::{MixtureFit, RadialVelocities, fit_mixture};
+
+/// Bins of fewer velocities are fitted together with their neighbours.
+const FEW: usize = 16;
+/// Elevations of one cone, degrees, and the least step of heights that are those of gates, m.
+const SAME_ELEVATION_DEG: f64 = 0.2;
+const LEAST_STEP_M: f64 = 0.05;
+/// Step of heights of scans of several elevations, m.
+const USUAL_STEP_M: f64 = 25.0;
+
+/// A velocity of one gate.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cell {
+    /// Number of its ray in the window.
+    pub(super) line: usize,
+    /// Number of its gate in the ray.
+    pub(super) gate: usize,
+    pub(super) direction: [f64; 3],
+    pub(super) range_m: f64,
+    pub(super) velocity_m_s: f64,
+    /// NaN if it is unknown.
+    pub(super) sigma_m_s: f64,
+    pub(super) fold_m_s: Option<f64>,
+}
+
+/// A bin of height and its wind.
+#[derive(Debug, Clone)]
+pub(super) struct Bin {
+    pub(super) height_m: f64,
+    pub(super) cells: Vec<Cell>,
+    pub(super) wind: BinWind,
+}
+
+/// What a bin tells of the wind.
+#[derive(Debug, Clone)]
+pub(super) enum BinWind {
+    /// Its directions do not determine it.
+    Undetermined,
+    /// Its velocities are noise.
+    Noise { likelihood: f64 },
+    /// A wind.
+    Found(Box<FoundWind>),
+}
+
+/// The wind of a bin.
+#[derive(Debug, Clone)]
+pub(super) struct FoundWind {
+    pub(super) fit: MixtureFit,
+    /// Unit vectors of the components that were fitted.
+    pub(super) axes: Vec<[f64; 3]>,
+    pub(super) has_no_up: bool,
+    /// Whether neighbouring bins were fitted together with this one.
+    pub(super) has_few_cells: bool,
+    /// The velocities that were fitted.
+    pub(super) used: Vec<Cell>,
+    /// Where those of this bin begin among them.
+    pub(super) first_own: usize,
+    /// How the components depend on the velocities \[component, velocity\].
+    pub(super) gain: Array2<f64>,
+}
+
+impl FoundWind {
+    /// The wind at the height of the bin (east, north, up), as far as it was fitted, m/s.
+    pub(super) fn vector_m_s(&self) -> [f64; 3] {
+        let mut vector = [0.0; 3];
+        for (axis, value) in self.axes.iter().zip(&self.fit.wind_m_s) {
+            for d in 0..3 {
+                vector[d] += axis[d] * value;
+            }
+        }
+        vector
+    }
+
+    /// Probabilities of the velocities of this bin to be good.
+    pub(super) fn own_weights(&self, count: usize) -> &[f64] {
+        &self.fit.weights[self.first_own..self.first_own + count]
+    }
+}
+
+/// The velocities of rays.
+fn cells(rays: &[Ray]) -> Vec<Cell> {
+    let mut cells = Vec::new();
+    for (line, ray) in rays.iter().enumerate() {
+        let direction = ray.direction();
+        for (gate, (range_m, velocity_m_s)) in ray.range_m.iter().zip(&ray.velocity_m_s).enumerate()
+        {
+            if range_m.is_finite() && velocity_m_s.is_finite() {
+                cells.push(Cell {
+                    line,
+                    gate,
+                    direction,
+                    range_m: *range_m,
+                    velocity_m_s: *velocity_m_s,
+                    sigma_m_s: ray.sigma_m_s.get(gate).copied().unwrap_or(f64::NAN),
+                    fold_m_s: ray.fold_m_s,
+                });
+            }
+        }
+    }
+    cells
+}
+
+fn is_up(ray: &Ray) -> bool {
+    ray.elevation_rad.cos().abs() < SAME_ELEVATION_DEG.to_radians().sin()
+}
+
+/// Heights of the gates of rays of one slanted elevation, or of vertical ones, increasing, m; none of rays of several elevations.
+fn gate_heights_m(rays: &[Ray]) -> Option<Vec<f64>> {
+    let mut chosen: Option<&Ray> = None;
+    let all_up = rays.iter().all(is_up);
+    for ray in rays.iter().filter(|ray| all_up || !is_up(ray)) {
+        let apart_rad = chosen.map_or(0.0, |chosen| {
+            ray.direction()[2].asin() - chosen.direction()[2].asin()
+        });
+        if apart_rad.abs() > SAME_ELEVATION_DEG.to_radians() {
+            return None;
+        }
+        if chosen.is_none_or(|chosen| ray.range_m.len() > chosen.range_m.len()) {
+            chosen = Some(ray);
+        }
+    }
+    let chosen = chosen?;
+    let up = chosen.direction()[2];
+    let mut heights_m: Vec<f64> = chosen.range_m.iter().map(|range_m| range_m * up).collect();
+    heights_m.retain(|height_m| height_m.is_finite());
+    heights_m.sort_by(f64::total_cmp);
+    let is_stepped = |pair: &[f64]| pair[1] - pair[0] >= LEAST_STEP_M;
+    (heights_m.len() > 1 && heights_m.windows(2).all(is_stepped)).then_some(heights_m)
+}
+
+/// Middles of the multiples of a step in which there are velocities, increasing, m.
+fn stepped_heights_m(cells: &[Cell], step_m: f64) -> Vec<f64> {
+    let mut numbers: Vec<i64> = Vec::with_capacity(cells.len());
+    for cell in cells {
+        numbers.push((cell.range_m * cell.direction[2] / step_m).floor() as i64);
+    }
+    numbers.sort_unstable();
+    numbers.dedup();
+    let middles = numbers.iter().map(|number| (*number as f64 + 0.5) * step_m);
+    middles.collect()
+}
+
+/// Velocities in bins of height, the lowest first, without a wind as yet.
+fn bins(rays: &[Ray], height_step_m: Option<f64>) -> Vec<Bin> {
+    let cells = cells(rays);
+    let of_gates = match height_step_m {
+        None => gate_heights_m(rays),
+        Some(_) => None,
+    };
+    let usual_step_m = height_step_m.unwrap_or(USUAL_STEP_M);
+    let centres_m = of_gates.unwrap_or_else(|| stepped_heights_m(&cells, usual_step_m));
+    let mut bins = Vec::with_capacity(centres_m.len());
+    for height_m in &centres_m {
+        bins.push(Bin {
+            height_m: *height_m,
+            cells: Vec::new(),
+            wind: BinWind::Undetermined,
+        });
+    }
+    let step_m = |bin: usize| -> f64 {
+        let below = bin.saturating_sub(1);
+        let above = (bin + 1).min(centres_m.len() - 1);
+        match above - below {
+            0 => usual_step_m,
+            steps => (centres_m[above] - centres_m[below]) / steps as f64,
+        }
+    };
+    for cell in cells {
+        let height_m = cell.range_m * cell.direction[2];
+        let above = centres_m.partition_point(|centre_m| *centre_m < height_m);
+        let near = [above.saturating_sub(1), above.min(centres_m.len() - 1)];
+        let from_m = near.map(|bin| (centres_m[bin] - height_m).abs());
+        let nearest = if from_m[0] <= from_m[1] {
+            near[0]
+        } else {
+            near[1]
+        };
+        if from_m[0].min(from_m[1]) <= 0.5 * step_m(nearest) * (1.0 + 1e-9) {
+            bins[nearest].cells.push(cell);
+        }
+    }
+    bins
+}
+
+/// The winds of one window, from the lowest height up.
+///
+/// # Errors
+/// What the fit refuses; velocities that are finite give none.
+pub(super) fn winds(
+    rays: &[Ray],
+    components: &Components,
+    half_band_m_s: f64,
+    options: &WindOptions,
+) -> Result<Vec<Bin>, Error> {
+    let mut bins = bins(rays, options.height_step_m);
+    let mut below: Option<Vec<f64>> = None;
+    for number in 0..bins.len() {
+        let wind = wind_of(&bins, number, components, half_band_m_s, below.as_deref())?;
+        if let BinWind::Found(found) = &wind {
+            below = Some(found.fit.wind_m_s.clone());
+        }
+        bins[number].wind = wind;
+    }
+    Ok(bins)
+}
+
+/// The bins that are fitted together with one of few velocities: as few about it as have enough.
+fn stack(bins: &[Bin], number: usize) -> std::ops::Range<usize> {
+    let mut range = number..number + 1;
+    let mut count = bins[number].cells.len();
+    while count < FEW && (range.start > 0 || range.end < bins.len()) {
+        let below_m = match range.start {
+            0 => f64::INFINITY,
+            start => bins[number].height_m - bins[start - 1].height_m,
+        };
+        let above_m = match bins.get(range.end) {
+            None => f64::INFINITY,
+            Some(bin) => bin.height_m - bins[number].height_m,
+        };
+        if below_m < above_m {
+            range.start -= 1;
+            count += bins[range.start].cells.len();
+        } else {
+            count += bins[range.end].cells.len();
+            range.end += 1;
+        }
+    }
+    range
+}
+
+/// Velocities that are fitted together.
+struct Stack {
+    used: Vec<Cell>,
+    /// Their heights over that of the bin; a difference of 1 is the whole stack.
+    heights: Vec<f64>,
+    /// Where those of the bin begin.
+    first_own: usize,
+    has_few_cells: bool,
+}
+
+fn stacked(bins: &[Bin], number: usize) -> Stack {
+    let range = stack(bins, number);
+    let span_m = bins[range.end - 1].height_m - bins[range.start].height_m;
+    let mut stack = Stack {
+        used: Vec::new(),
+        heights: Vec::new(),
+        first_own: 0,
+        has_few_cells: range.len() > 1,
+    };
+    for bin in range {
+        if bin == number {
+            stack.first_own = stack.used.len();
+        }
+        for cell in &bins[bin].cells {
+            stack.used.push(*cell);
+            let over_m = bins[bin].height_m - bins[number].height_m;
+            stack.heights.push(over_m / span_m.max(1.0));
+        }
+    }
+    stack
+}
+
+/// The wind of one bin.
+fn wind_of(
+    bins: &[Bin],
+    number: usize,
+    components: &Components,
+    half_band_m_s: f64,
+    below_m_s: Option<&[f64]>,
+) -> Result<BinWind, Error> {
+    let own = &bins[number].cells;
+    let directions: Vec<[f64; 3]> = own.iter().map(|cell| cell.direction).collect();
+    let axes = match components.determined_by(&directions) {
+        Determined::All => components.axes.clone(),
+        Determined::WithoutUp => components.axes[..components.axes.len() - 1].to_vec(),
+        Determined::None => return Ok(BinWind::Undetermined),
+    };
+    let Stack {
+        used,
+        heights,
+        first_own,
+        has_few_cells,
+    } = stacked(bins, number);
+    let count = axes.len();
+    let columns = if has_few_cells { 2 * count } else { count };
+    let rows = Array2::from_shape_fn((used.len(), columns), |(i, j)| {
+        let along = dot(used[i].direction, axes[j % count]);
+        if j < count { along } else { along * heights[i] }
+    });
+    let velocities: Vec<f64> = used.iter().map(|cell| cell.velocity_m_s).collect();
+    let fold_m_s = used[0].fold_m_s;
+    let have_one_fold = used.iter().all(|cell| cell.fold_m_s == fold_m_s);
+    let data = RadialVelocities {
+        rows: rows.view(),
+        velocity_m_s: &velocities,
+        half_band_m_s,
+        fold_m_s: fold_m_s.filter(|_| have_one_fold),
+    };
+    let start_m_s = below_m_s.filter(|start| start.len() == count).map(|start| {
+        let mut start = start.to_vec();
+        start.resize(columns, 0.0);
+        start
+    });
+    let Some(mut fit) = fit_mixture(&data, start_m_s.as_deref())? else {
+        return Ok(BinWind::Undetermined);
+    };
+    let gain = fit.gain(rows.view()).filter(|_| fit.is_accepted());
+    let Some(gain) = gain else {
+        return Ok(BinWind::Noise {
+            likelihood: fit.likelihood,
+        });
+    };
+    fit.wind_m_s.truncate(count);
+    Ok(BinWind::Found(Box::new(FoundWind {
+        gain: gain.slice(s![..count, ..]).to_owned(),
+        has_no_up: count < components.axes.len(),
+        has_few_cells,
+        axes,
+        fit,
+        used,
+        first_own,
+    })))
+}
