@@ -55,6 +55,8 @@ impl Wind<'_> {
     fn at(&self, p: [f64; 3], time_s: f64) -> [f64; 3] {
         match self.s("kind").as_str() {
             "calm" => [0.0; 3],
+            // None of the draw has eddies; each of their keys is examined on its own.
+            "wind" => self.mean_wind(p[2]),
             "uniform" => [0.0, self.f("lateral_m_s"), self.f("vertical_m_s")],
             "linear" => {
                 let (start, a) = (
@@ -72,6 +74,64 @@ impl Wind<'_> {
             }
             _ => self.pair(p, time_s),
         }
+    }
+
+    /// A mean wind at a height: laws that are linear near the ground, or straight lines of a table.
+    fn mean_wind(&self, z_m: f64) -> [f64; 3] {
+        if self.s("profile") == "table" {
+            return self.table_wind(z_m);
+        }
+        let is_power = self.s("profile") == "power";
+        let (roughness_m, top_m) = (self.or("roughness_m", 0.03), self.or("displacement_m", 0.0));
+        let linear_m = if is_power {
+            1.0
+        } else {
+            (10.0 * roughness_m).max(1.0)
+        };
+        let shape = |above_m: f64| match is_power {
+            true => above_m.powf(self.or("exponent", 0.143)),
+            false => (above_m / roughness_m).ln(),
+        };
+        let (above_m, z0_m) = (z_m - top_m, self.or("reference_height_m", 10.0) - top_m);
+        let at = shape(above_m.max(linear_m)) * (above_m / linear_m).clamp(0.0, 1.0);
+        let (mut u, mut v) = match (self.f("head_wind_m_s"), self.f("cross_wind_m_s")) {
+            (head, cross) if head.is_nan() && cross.is_nan() => {
+                let toward = self.or("toward_rad", 0.5 * PI);
+                let speed = self.or("speed_m_s", 5.0);
+                (speed * toward.cos(), speed * toward.sin())
+            }
+            _ => (
+                -self.or("head_wind_m_s", 0.0),
+                self.or("cross_wind_m_s", 0.0),
+            ),
+        };
+        let mut over = at / shape(z0_m);
+        if self.f("friction_velocity_m_s").is_finite() {
+            let toward = self.or("toward_rad", 0.5 * PI);
+            (u, v) = (toward.cos(), toward.sin());
+            over = self.f("friction_velocity_m_s") / 0.4 * at;
+        }
+        [over * u, over * v, 0.0]
+    }
+
+    fn table_wind(&self, z_m: f64) -> [f64; 3] {
+        let heights = numbers((self.0)("height_m"));
+        let speeds = numbers((self.0)("speeds_m_s"));
+        let towards = numbers((self.0)("towards_rad"));
+        let mut out = [0.0; 3];
+        for (i, &height_m) in heights.iter().enumerate() {
+            // A hat about each height, flat beyond the ends.
+            let mut share = 1.0_f64;
+            if z_m < height_m && i > 0 {
+                share = ((z_m - heights[i - 1]) / (height_m - heights[i - 1])).max(0.0);
+            }
+            if z_m > height_m && i + 1 < heights.len() {
+                share = ((heights[i + 1] - z_m) / (heights[i + 1] - height_m)).max(0.0);
+            }
+            out[0] += share * speeds[i] * towards[i].cos();
+            out[1] += share * speeds[i] * towards[i].sin();
+        }
+        out
     }
 
     /// Half the distance, and the height, of the vortices at a time: (V8) to (V10).

@@ -190,6 +190,7 @@ pub(crate) fn flow(r: &mut Random, s: &mut Scene) {
                 .number("flow.lateral_m_s", r.between(-10.0, 10.0))
                 .number("flow.vertical_m_s", r.between(-1.0, 1.0));
         }
+        7 => mean_wind(r, s),
         _ => {
             s.word("flow.kind", "linear").set(
                 "flow.velocity_m_s",
@@ -217,6 +218,49 @@ pub(crate) fn flow(r: &mut Random, s: &mut Scene) {
                 r.between(-6.0, 6.0)
             ),
         );
+    }
+}
+
+/// A mean wind over the height, of each law.
+fn mean_wind(r: &mut Random, s: &mut Scene) {
+    s.word("flow.kind", "wind");
+    match r.whole(0, 3) {
+        0 => {
+            s.number("flow.speed_m_s", r.between(0.0, 12.0))
+                .number("flow.toward_rad", r.between(0.0, 6.0));
+            s.number("flow.roughness_m", r.log(1e-3, 0.3))
+                .number("flow.displacement_m", r.between(0.0, 5.0));
+        }
+        1 => {
+            s.number("flow.friction_velocity_m_s", r.between(0.1, 0.8))
+                .number("flow.roughness_m", r.log(1e-3, 0.3));
+        }
+        2 => {
+            s.word("flow.profile", "power")
+                .number("flow.exponent", r.between(0.0, 0.4));
+            s.number("flow.head_wind_m_s", r.between(-8.0, 8.0))
+                .number("flow.cross_wind_m_s", r.between(-8.0, 8.0));
+        }
+        _ => {
+            // Kinks below the scan: the sums of both sides are good to 1e-6 where the wind is smooth.
+            let first_m = r.between(0.0, 4.0);
+            s.word("flow.profile", "table").set(
+                "flow.height_m",
+                format!("[{first_m:?}, {:?}, 300.0]", first_m + r.between(1.0, 6.0)),
+            );
+            s.set(
+                "flow.speeds_m_s",
+                format!(
+                    "[{:?}, {:?}, 9.0]",
+                    r.between(0.0, 5.0),
+                    r.between(0.0, 9.0)
+                ),
+            );
+            s.set(
+                "flow.towards_rad",
+                format!("[1.0, {:?}, 2.0]", r.between(0.0, 6.0)),
+            );
+        }
     }
 }
 

@@ -169,7 +169,7 @@ fn signals_and_map<S: Sample + wakescope_signal::Sample>(
         result.signals_a = Array2::from_shape_vec(shape, in_phase).ok();
         result.quadrature_a =
             quadrature.and_then(|values| Array2::from_shape_vec(shape, values).ok());
-        let lines = &scanner.lines;
+        let lines = &scanner.air.lines;
         let layers = lines
             .first()
             .map_or(0, |line| line.radial_velocity_m_s.len());

@@ -3,11 +3,13 @@
 //!
 //! | file | what is in it |
 //! |---|---|
-//! | `wind` | the trait [`Wind`]; [`Sum`] |
+//! | `wind` | the trait [`Wind`]; [`SampledLine`]; [`Sum`] |
 //! | `profile` | circulation against radius of one vortex, (3), (4); the two-scale profile |
 //! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
 //! | `along_flight` | the pair, older the farther it is behind the aircraft |
 //! | `linear` | [`Linear`]: uniform, or linear in place and time |
+//! | `mean_wind` | [`MeanWind`]: logarithmic law, power law or table over the height |
+//! | `eddies` | [`Eddies`]: turbulence as a sum of plane waves |
 //! | `grid_wind` | [`GridSnapshot`]: a field on a mesh, interpolated by (26) |
 //! | `volume` | fields in three dimensions |
 //! | `series` | [`Series`]: fields at several times, a wind that moves |
@@ -16,8 +18,10 @@
 
 mod along_flight;
 pub(crate) mod axis;
+mod eddies;
 pub(crate) mod grid_wind;
 mod linear;
+mod mean_wind;
 mod profile;
 mod series;
 mod strain;
@@ -27,10 +31,12 @@ mod wind;
 
 pub use along_flight::AlongFlight;
 pub use axis::{Edges, Side, m4_prime, m4_prime_weights};
+pub use eddies::{Eddies, LineEvaluation, Mode, ModeBand, isotropic_modes};
 pub use grid_wind::{GridSnapshot, PlaneMesh};
 pub use linear::Linear;
+pub use mean_wind::{MeanWind, VON_KARMAN_CONSTANT, WindLaw};
 pub use profile::{CirculationProfile, TwoScale};
 pub use series::Series;
 pub use volume::{VolumeComponent, VolumeSnapshot};
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair};
-pub use wind::{Sum, Wind};
+pub use wind::{SampledLine, Sum, Wind};

@@ -25,10 +25,79 @@ pub trait Wind: Send + Sync {
         out_m_s: &mut [[f64; 3]],
     ) -> Result<(), Error>;
 
+    /// Writes the velocity along a line, `e . u` \[m/s\], at its samples `first`, `first + 1`, ...
+    /// into `out_m_s`. A sample has the same bits whatever samples are written with it.
+    ///
+    /// # Errors
+    /// As [`Self::velocity_into`].
+    fn along_line_into(
+        &self,
+        line: &SampledLine,
+        first: usize,
+        time_s: f64,
+        out_m_s: &mut [f64],
+    ) -> Result<(), Error> {
+        let points_m: Vec<[f64; 3]> = (first..first + out_m_s.len())
+            .map(|index| line.point_m(index))
+            .collect();
+        let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
+        self.velocity_into(&points_m, time_s, &mut velocity_m_s)?;
+        let [x, y, z] = line.direction;
+        for (out, [u, v, w]) in out_m_s.iter_mut().zip(velocity_m_s) {
+            *out = x * u + y * v + z * w;
+        }
+        Ok(())
+    }
+
     /// Upper bound of the gradient of the radial velocity along any straight line,
     /// `|e . grad(u) . e|` for unit `e` \[1/s\]: the largest eigenvalue of the strain rate. It sets
     /// how thin the layers of a lidar signal must be. Each wind says how sharp its bound is.
     fn max_gradient_per_s(&self, time_s: f64) -> f64;
+}
+
+/// Equally spaced samples along a straight line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampledLine {
+    /// Sample 0 \[m\].
+    pub origin_m: [f64; 3],
+    /// Unit vector along the line.
+    pub direction: [f64; 3],
+    /// Distance between samples \[m\].
+    pub step_m: f64,
+}
+
+impl SampledLine {
+    /// Position of a sample \[m\].
+    pub fn point_m(&self, index: usize) -> [f64; 3] {
+        let along_m = index as f64 * self.step_m;
+        [0, 1, 2].map(|d| self.origin_m[d] + along_m * self.direction[d])
+    }
+}
+
+/// A wind that several owners share.
+impl<T: Wind + ?Sized> Wind for std::sync::Arc<T> {
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), Error> {
+        (**self).velocity_into(points_m, time_s, out_m_s)
+    }
+
+    fn along_line_into(
+        &self,
+        line: &SampledLine,
+        first: usize,
+        time_s: f64,
+        out_m_s: &mut [f64],
+    ) -> Result<(), Error> {
+        (**self).along_line_into(line, first, time_s, out_m_s)
+    }
+
+    fn max_gradient_per_s(&self, time_s: f64) -> f64 {
+        (**self).max_gradient_per_s(time_s)
+    }
 }
 
 /// The sum of several winds, such as a vortex pair in a cross wind. An empty sum is air at rest.
@@ -70,6 +139,24 @@ impl Wind for Sum {
                 *sum += other
             })
         })
+    }
+
+    fn along_line_into(
+        &self,
+        line: &SampledLine,
+        first: usize,
+        time_s: f64,
+        out_m_s: &mut [f64],
+    ) -> Result<(), Error> {
+        out_m_s.fill(0.0);
+        let mut one_m_s = vec![0.0; out_m_s.len()];
+        for wind in &self.winds {
+            wind.along_line_into(line, first, time_s, &mut one_m_s)?;
+            for (sum, one) in out_m_s.iter_mut().zip(&one_m_s) {
+                *sum += one;
+            }
+        }
+        Ok(())
     }
 
     /// The sum of the bounds: sharp when one wind dominates.

@@ -120,8 +120,8 @@ impl Sample {
         } else {
             None
         };
-        for scan in &map.scans {
-            let velocity_m_s = &scan.error_m_s + &map.v_pulse_m_s;
+        for (realisation, scan) in map.scans.iter().enumerate() {
+            let velocity_m_s = &scan.error_m_s + map.pulse_truth_m_s(realisation);
             sample.wind_m_s.extend(mean_wind_m_s(plan, &velocity_m_s)?);
             if let Some(retrieval) = &retrieval {
                 let fitted = retrieval.circulation_m2_s(&velocity_m_s);

@@ -481,6 +481,8 @@ mod tests {
             "calm",
             "uniform",
             "linear",
+            "wind",
+            "eddies",
             "vortex_pair",
             "simulated",
             "fields",

@@ -566,7 +566,12 @@ impl Format<'_> {
         let mut examples = self.examples.iter();
         examples
             .find_map(|text| value_in_example(text, &path, kind))
-            .or_else(|| self.plain_default(whole).filter(|_| !is_element))
+            .or_else(|| {
+                // A key of another kind may have the same name.
+                let is_list = matches!(kind, Kind::List { .. });
+                self.plain_default(whole)
+                    .filter(|_| !is_element && !is_list)
+            })
     }
 
     /// The default of a key that is neither a list nor a table.

@@ -68,6 +68,9 @@ pub struct ScanErrors {
     pub error_m_s: Array2<f64>,
     /// Whether the estimate was flagged.
     pub flagged: Array2<bool>,
+    /// True velocities weighted with the pulse, and with pulse and window, m/s, of a realisation
+    /// that has turbulence of its own.
+    pub own_truth_m_s: Option<[Array2<f64>; 2]>,
 }
 
 /// What the realisations of a map say of the law of its errors, each array \[line, gate\].

@@ -7,8 +7,8 @@ use crate::measure::gate_estimates::GateSums;
 use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints, WindowSums};
 use crate::measure::ray_information::range_filter;
 use crate::measure::region::places;
-use crate::measure::scan::Scanner;
 use crate::measure::scan::products::LineDraws;
+use crate::measure::scan::{ScanAir, Scanner};
 use crate::plan::line_wind::{radial_velocity_m_s, weighted_at_gates_m_s};
 use crate::plan::{Plan, Stage};
 use crate::progress::Observer;
@@ -77,6 +77,24 @@ pub struct VelocityEstimates {
     pub law: Option<ErrorLaw>,
 }
 
+impl VelocityEstimates {
+    /// True velocities of a realisation weighted with the pulse, m/s.
+    pub(crate) fn pulse_truth_m_s(&self, realisation: usize) -> &Array2<f64> {
+        self.own_truth_m_s(realisation)
+            .map_or(&self.v_pulse_m_s, |[pulse_m_s, _]| pulse_m_s)
+    }
+
+    /// True velocities of a realisation weighted with pulse and window, m/s.
+    pub(crate) fn gate_truth_m_s(&self, realisation: usize) -> &Array2<f64> {
+        self.own_truth_m_s(realisation)
+            .map_or(&self.v_gate_m_s, |[_, gate_m_s]| gate_m_s)
+    }
+
+    fn own_truth_m_s(&self, realisation: usize) -> Option<&[Array2<f64>; 2]> {
+        self.scans.get(realisation)?.own_truth_m_s.as_ref()
+    }
+}
+
 /// Accumulates the errors of realisation after realisation.
 struct Mapper<'p, S> {
     estimator: MapEstimator<'p, S>,
@@ -104,7 +122,7 @@ impl<'p, S: Sample> Mapper<'p, S> {
             elevation_rad: g.elevation_rad.clone(),
             range_m: g.gate_range_m.clone(),
             radius_m: radius_m.collect::<Result<_, _>>()?,
-            ..truth(plan, scanner, shape)?
+            ..truth(plan, &scanner.air, shape)?
         };
         Ok(Self {
             noise: estimator.noise(&places, &points)?,
@@ -117,14 +135,26 @@ impl<'p, S: Sample> Mapper<'p, S> {
         })
     }
 
-    /// Estimates the velocities of one realisation and adds their errors; returns the velocities, m/s.
-    fn add(&mut self, scan: &Scan) -> Result<Array2<f64>, Error> {
+    /// Estimates the velocities of one realisation and adds their errors against its own air, or else that of all; returns the
+    /// velocities, m/s.
+    fn add(
+        &mut self,
+        plan: &Plan,
+        scan: &Scan,
+        own: Option<&ScanAir>,
+    ) -> Result<Array2<f64>, Error> {
         let found = self.estimator.gates(scan, &self.points, &self.noise)?;
         let (map, shape) = (&mut self.map, self.gates.dim());
+        let own = own.map(|air| truth(plan, air, shape)).transpose()?;
+        let own_truth_m_s = own.map(|truth| [truth.v_pulse_m_s, truth.v_gate_m_s]);
         let velocity = Array2::from_shape_fn(shape, |(i, j)| {
             found[i * shape.1 + j].found.estimate.velocity_m_s
         });
-        self.errors.add(velocity.view(), map.v_pulse_m_s.view())?;
+        let truth_m_s = own_truth_m_s
+            .as_ref()
+            .map_or(&map.v_pulse_m_s, |[pulse_m_s, _]| pulse_m_s);
+        self.errors.add(velocity.view(), truth_m_s.view())?;
+        let error_m_s = &velocity - truth_m_s;
         if map.scans.is_empty() {
             let known =
                 |estimate: &f64, truth: &f64| if truth.is_nan() { f64::NAN } else { *estimate };
@@ -137,8 +167,9 @@ impl<'p, S: Sample> Mapper<'p, S> {
             *flagged = sums.add(found, 1.0);
         }
         map.scans.push(ScanErrors {
-            error_m_s: &velocity - &map.v_pulse_m_s,
+            error_m_s,
             flagged,
+            own_truth_m_s,
         });
         Ok(velocity)
     }
@@ -175,24 +206,21 @@ impl<'p, S: Sample> Mapper<'p, S> {
 }
 
 /// The air at the gates, \[line, gate\], and nothing else yet.
-fn truth(
-    plan: &Plan,
-    scanner: &Scanner<'_>,
-    shape: (usize, usize),
-) -> Result<VelocityEstimates, Error> {
+fn truth(plan: &Plan, air: &ScanAir, shape: (usize, usize)) -> Result<VelocityEstimates, Error> {
     let g = &plan.geometry;
     let [mut exact_m_s, mut pulse_m_s, mut gate_m_s] = [(); 3].map(|()| Array2::zeros(shape));
     let by_pulse = RangeFilter::pulse(&plan.instrument.pulse, g.layer_thickness_m)?;
     let by_gate = range_filter(plan)?;
-    for i in 0..scanner.lines.len() {
+    for i in 0..air.lines.len() {
         exact_m_s
             .row_mut(i)
             .assign(&Array1::from(radial_velocity_m_s(
                 plan,
+                &air.wind,
                 i,
                 &g.gate_range_m,
             )?));
-        let line = &scanner.lines[i];
+        let line = &air.lines[i];
         for (filter, cells) in [(&by_pulse, &mut pulse_m_s), (&by_gate, &mut gate_m_s)] {
             cells.row_mut(i).assign(&Array1::from(weighted_at_gates_m_s(
                 filter,
@@ -205,7 +233,7 @@ fn truth(
         v_exact_m_s: exact_m_s,
         v_pulse_m_s: pulse_m_s,
         v_gate_m_s: gate_m_s,
-        v_spread_m_s: scanner.spread_m_s.clone(),
+        v_spread_m_s: air.spread_m_s.clone(),
         v_scan_m_s: Array2::from_elem(shape, f64::NAN),
         ..VelocityEstimates::default()
     })
@@ -287,8 +315,9 @@ pub(crate) fn of_sums<S: Sample>(
         let mut sums = sums.collect::<Result<Vec<_>, _>>()?;
         clipped += add(realisation, &mut sums)?;
         let scans: Vec<Scan> = sums.into_iter().map(ScanSums::finish).collect();
+        let own = scanner.own_air(realisation)?;
         for (i, (mapper, scan)) in mappers.iter_mut().zip(&scans).enumerate() {
-            seen(i, &mapper.add(scan)?);
+            seen(i, &mapper.add(plans[i], scan, own.as_ref())?);
         }
     }
     observer.end();

@@ -7,14 +7,16 @@ use crate::measure::profile::{EfficiencyMemo, LineOptics, efficiency_by_theory};
 use crate::plan::geometry::Geometry;
 use crate::plan::instrument::Instrument;
 use crate::plan::line_wind::{LineWind, known_velocity_m_s, wind_along, wind_of_line};
+use crate::plan::wind::SceneWind;
 use crate::plan::{Plan, Stage};
-use crate::progress::Observer;
+use crate::progress::{Observer, Silent};
 use crate::scene::{DetectorSignal, Scene, SecondTrip, SnrReference};
 use crate::streams::stream;
 use ndarray::{Array2, ArrayView2};
 use rand_xoshiro::rand_core::Rng;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 use wakescope_signal::Sample;
 use wakescope_signal::digitise::Clipped;
 use wakescope_signal::efficiency::LayerEfficiency;
@@ -43,15 +45,59 @@ pub struct Scanner<'a> {
     simulator: Simulator,
     /// Return per metre of each layer.
     weight_per_m: Vec<f64>,
+    /// The air of the first realisation, which all have unless each has its own turbulence.
+    pub air: ScanAir,
+    /// The efficiency of each pulse over the mean, where pulses have their own.
+    efficiency: Option<LayerEfficiency>,
+}
+
+/// The air along the lines of sight of a realisation.
+pub struct ScanAir {
+    pub(crate) wind: Arc<SceneWind>,
     /// The air of each line, in the order of the geometry's elevations: that of its middle, or the mean of the airs of its pulses.
     pub lines: Vec<LineOfSight>,
     /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the pulses
     /// have airs of their own.
     pub spread_m_s: Option<Array2<f64>>,
-    /// The efficiency of each pulse over the mean, where pulses have their own.
-    efficiency: Option<LayerEfficiency>,
     /// The air that the pulse before lights meanwhile, if the scene asks for its echo.
     previous: Option<Vec<LineOfSight>>,
+}
+
+impl ScanAir {
+    /// Samples a wind along every line of sight.
+    fn new(
+        plan: &Plan,
+        wind: Arc<SceneWind>,
+        weight_per_m: &[f64],
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
+        let geometry = &plan.geometry;
+        let by_pulse = RangeFilter::pulse(&plan.instrument.pulse, geometry.layer_thickness_m)?;
+        let ranges_m: Vec<f64> = geometry.layer_range_m().collect();
+        let all: Vec<usize> = (0..geometry.schedule.lines.len()).collect();
+        let of_line = |&line: &usize| {
+            let air = wind_of_line(plan, &wind, &by_pulse, &ranges_m, line)?;
+            observer.advance(1);
+            Ok(air)
+        };
+        let airs = in_time_order(&wind, &all, |line| geometry.line_time_s[*line], of_line)?;
+        let lines: Vec<LineOfSight> = airs
+            .iter()
+            .map(|air| line_of_sight(weight_per_m, air, geometry))
+            .collect();
+        let spreads: Option<Vec<&[f64]>> =
+            airs.iter().map(|air| air.spread_m_s.as_deref()).collect();
+        let shape = (lines.len(), geometry.gate_range_m.len());
+        let spread_m_s =
+            spreads.and_then(|values| Array2::from_shape_vec(shape, values.concat()).ok());
+        let previous = previous_air(plan, &wind, &lines)?;
+        Ok(Self {
+            wind,
+            lines,
+            spread_m_s,
+            previous,
+        })
+    }
 }
 
 impl<'a> Scanner<'a> {
@@ -80,26 +126,9 @@ impl<'a> Scanner<'a> {
         };
         let weight_per_m = layer_returns(&optics)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
-        let by_pulse = RangeFilter::pulse(&instrument.pulse, geometry.layer_thickness_m)?;
-        let ranges_m: Vec<f64> = geometry.layer_range_m().collect();
-        let all: Vec<usize> = (0..geometry.schedule.lines.len()).collect();
-        let of_line = |&line: &usize| {
-            let air = wind_of_line(plan, &by_pulse, &ranges_m, line)?;
-            observer.advance(1);
-            Ok(air)
-        };
-        let airs = in_time_order(plan, &all, |line| geometry.line_time_s[*line], of_line)?;
-        let lines: Vec<LineOfSight> = airs
-            .iter()
-            .map(|air| line_of_sight(&weight_per_m, air, geometry))
-            .collect();
-        let spreads: Option<Vec<&[f64]>> =
-            airs.iter().map(|air| air.spread_m_s.as_deref()).collect();
-        let shape = (lines.len(), geometry.gate_range_m.len());
-        let spread_m_s =
-            spreads.and_then(|values| Array2::from_shape_vec(shape, values.concat()).ok());
+        let air = ScanAir::new(plan, plan.wind.clone(), &weight_per_m, observer)?;
         observer.end();
-        let efficiency = drawn_efficiency(&optics, &lines)?;
+        let efficiency = drawn_efficiency(&optics, &air.lines)?;
         let record = Record {
             time_of_first_sample_s: 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S,
             samples: geometry.samples,
@@ -112,21 +141,18 @@ impl<'a> Scanner<'a> {
                 Simulator::for_baseband(&instrument.pulse, instrument.receiver, record)?
             }
         };
-        let previous = previous_air(plan, &lines)?;
         Ok(Self {
             plan,
             simulator,
             weight_per_m,
-            lines,
-            spread_m_s,
+            air,
             efficiency,
-            previous,
         })
     }
 
     /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio.
     pub fn layer_snr(&self) -> Vec<(f64, f64)> {
-        let Some(line) = self.lines.first() else {
+        let Some(line) = self.air.lines.first() else {
             return Vec::new();
         };
         layer_snr(self.plan.scene(), &self.plan.instrument, line)
@@ -175,7 +201,9 @@ impl<'a> Scanner<'a> {
         mut sink: impl FnMut(usize, ArrayView2<'_, T>) -> Result<(), Error>,
     ) -> Result<Clipped, Error> {
         let mut size = records_at_once::<T>(self.simulator.record().samples, self.pulses());
-        if self.spread_m_s.is_some() {
+        let own = self.own_air(realisation)?;
+        let air = own.as_ref().unwrap_or(&self.air);
+        if air.spread_m_s.is_some() {
             // Each pulse brings its air: velocity and weight of each layer.
             let layers = self.plan.geometry.layers.max(1);
             size =
@@ -184,23 +212,37 @@ impl<'a> Scanner<'a> {
         let mut clipped = Clipped::default();
         for first in (0..self.pulses()).step_by(size) {
             let last = (first + size).min(self.pulses());
-            let (records, here) = self.piece(realisation, first..last, observer)?;
+            let (records, here) = self.piece(realisation, air, first..last, observer)?;
             clipped += here;
             sink(first, records.view())?;
         }
         Ok(clipped)
     }
 
+    /// The air of a realisation that has turbulence of its own; none of one that has that of all.
+    ///
+    /// # Errors
+    /// What the wind refuses; a checked scene gives none.
+    pub(crate) fn own_air(&self, realisation: usize) -> Result<Option<ScanAir>, Error> {
+        let plan = self.plan;
+        if realisation == 0 || !plan.scene().has_air_of_each_realisation() {
+            return Ok(None);
+        }
+        let wind = Arc::new(plan.wind.with_eddies_of(&plan.file, realisation)?);
+        ScanAir::new(plan, wind, &self.weight_per_m, &Silent).map(Some)
+    }
+
     /// The records of some pulses of a realisation.
     fn piece<T: Sample>(
         &self,
         realisation: usize,
+        air: &ScanAir,
         pulses: Range<usize>,
         observer: &dyn Observer,
     ) -> Result<(Array2<T>, Clipped), Error> {
         let schedule = &self.plan.geometry.schedule;
         let index = |key: PulseKey| realisation * self.pulses() + pulses.start + key.pulse;
-        let airs = self.airs_of_pulses(&pulses)?;
+        let airs = self.airs_of_pulses(air, &pulses)?;
         let scan = Scan {
             simulator: &self.simulator,
             // One line after the other, which the simulation of signals need not know.
@@ -213,11 +255,11 @@ impl<'a> Scanner<'a> {
                     observer.advance(1);
                 }
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
-                let previous = self.previous.as_ref().map(|lines| &lines[line]);
+                let previous = air.previous.as_ref().map(|lines| &lines[line]);
                 let impairment_seed =
                     stream(self.plan.scene().seed, "asides", index(key) as u64).next_u64();
                 Shot {
-                    line: airs.get(key.pulse).unwrap_or(&self.lines[line]),
+                    line: airs.get(key.pulse).unwrap_or(&air.lines[line]),
                     efficiency,
                     previous,
                     impairment_seed,
@@ -230,8 +272,12 @@ impl<'a> Scanner<'a> {
     }
 
     /// The air that each of some pulses meets; none where the pulses of a line share one.
-    fn airs_of_pulses(&self, pulses: &Range<usize>) -> Result<Vec<LineOfSight>, Error> {
-        if self.spread_m_s.is_none() {
+    fn airs_of_pulses(
+        &self,
+        air: &ScanAir,
+        pulses: &Range<usize>,
+    ) -> Result<Vec<LineOfSight>, Error> {
+        if air.spread_m_s.is_none() {
             return Ok(Vec::new());
         }
         let schedule = &self.plan.geometry.schedule;
@@ -241,23 +287,22 @@ impl<'a> Scanner<'a> {
             .map(|pulse| schedule.beam_of_pulse(pulse))
             .collect();
         let along = |beam: &Beam| {
-            let air = wind_along(self.plan, beam, &ranges_m)?;
+            let along = wind_along(self.plan, &air.wind, beam, &ranges_m)?;
             let geometry = &self.plan.geometry;
-            Ok(line_of_sight(&self.weight_per_m, &air, geometry))
+            Ok(line_of_sight(&self.weight_per_m, &along, geometry))
         };
-        in_time_order(self.plan, &beams, |beam| beam.time_s, along)
+        in_time_order(&air.wind, &beams, |beam| beam.time_s, along)
     }
 }
 
 /// Works on items in parallel, but on those of one stretch of the wind's times after those of the one before: a wind that is read
 /// from files then reads each once.
 fn in_time_order<T: Sync, R: Send>(
-    plan: &Plan,
+    wind: &SceneWind,
     items: &[T],
     time_s: impl Fn(&T) -> f64,
     work: impl Fn(&T) -> Result<R, Error> + Sync,
 ) -> Result<Vec<R>, Error> {
-    let wind = &plan.wind;
     let stretch = |item: &T| wind.stretch_of(wind.start_s + time_s(item));
     let mut out = Vec::with_capacity(items.len());
     for part in items.chunk_by(|a, b| stretch(a) == stretch(b)) {
@@ -326,7 +371,11 @@ fn layer_returns(optics: &LineOptics<'_>) -> Result<Vec<f64>, Error> {
 }
 
 /// The air from which the pulse before comes back at the same time, c/(2 PRF) farther away, at the ranges of the lines.
-fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfSight>>, Error> {
+fn previous_air(
+    plan: &Plan,
+    wind: &SceneWind,
+    lines: &[LineOfSight],
+) -> Result<Option<Vec<LineOfSight>>, Error> {
     let (scene, instrument, geometry) = (plan.scene(), &plan.instrument, &plan.geometry);
     let Some(SecondTrip {
         radial_velocity_m_s: elsewhere_m_s,
@@ -347,7 +396,7 @@ fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfS
         .map(weight)
         .collect::<Result<Vec<_>, Error>>()?;
     let far = |(i, line): (usize, &LineOfSight)| {
-        let mut velocity_m_s = known_velocity_m_s(plan, &geometry.schedule.middle(i), &ranges_m)?.1;
+        let mut velocity_m_s = known_velocity_m_s(wind, &geometry.schedule.middle(i), &ranges_m)?.1;
         velocity_m_s
             .iter_mut()
             .filter(|v| v.is_nan())

@@ -8,7 +8,7 @@ use crate::measure::scan::products::{kept_factors, lines_at_once};
 use crate::measure::scan::{WINDS_BYTES, records_at_once};
 use crate::plan::line_wind::radial_velocity_m_s;
 use crate::plan::{Plan, PlannedStage, Stage, Target};
-use crate::scene::{Flow, NoiseModel, Outside, WindOfPulses};
+use crate::scene::{EddyEvaluation, EddyGround, Flow, NoiseModel, Outside, WindOfPulses};
 
 /// The stage of the wind along the lines of sight.
 ///
@@ -173,7 +173,21 @@ fn kept_lines(plan: &Plan) -> f64 {
 
 /// Time of the wind at one point, s of one core.
 fn wind_point_s(flow: &Flow) -> f64 {
-    if flow.is_stored() { 4e-7 } else { 7e-8 }
+    match flow {
+        Flow::Eddies(eddies) => {
+            let mode_s = match eddies.evaluation {
+                EddyEvaluation::Levels => 1e-10,
+                EddyEvaluation::All => 2e-10,
+            };
+            let images = match eddies.ground {
+                EddyGround::Open => 1.0,
+                EddyGround::Blocked => 3.0,
+            };
+            eddies.modes as f64 * mode_s * images
+        }
+        flow if flow.is_stored() => 4e-7,
+        _ => 7e-8,
+    }
 }
 
 /// Largest number of layers of a line that are examined one by one.
@@ -198,11 +212,13 @@ fn refuse_lines_outside(plan: &Plan) -> Result<(), Error> {
             f64::INFINITY
         };
         let ends_m = [g.first_layer_range_m, last_m.min(ground_m)];
-        if g.first_layer_range_m <= ground_m && radial_velocity_m_s(plan, line, &ends_m).is_err() {
+        if g.first_layer_range_m <= ground_m
+            && radial_velocity_m_s(plan, &plan.wind, line, &ends_m).is_err()
+        {
             // The error of the run is that of the first layer outside.
             let ranges_m: Vec<f64> = g.layer_range_m().take(LAYERS_EXAMINED).collect();
-            radial_velocity_m_s(plan, line, &ranges_m)?;
-            radial_velocity_m_s(plan, line, &ends_m)?;
+            radial_velocity_m_s(plan, &plan.wind, line, &ranges_m)?;
+            radial_velocity_m_s(plan, &plan.wind, line, &ends_m)?;
         }
     }
     Ok(())

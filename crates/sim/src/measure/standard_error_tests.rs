@@ -89,7 +89,11 @@ impl Law {
                     *error = 2.0 * BAND_M_S * (uniform(rng) - 0.5);
                 }
             });
-            scans.push(ScanErrors { error_m_s, flagged });
+            scans.push(ScanErrors {
+                error_m_s,
+                flagged,
+                own_truth_m_s: None,
+            });
         }
         map_of(scans, SHARED, BAND_M_S)
     }
@@ -194,6 +198,7 @@ fn guesses_at_either_edge_of_the_band_have_squares_that_hardly_scatter() {
                 ScanErrors {
                     error_m_s,
                     flagged: Array2::from_elem(SHAPE, true),
+                    own_truth_m_s: None,
                 }
             };
             let scans: Vec<ScanErrors> = (0..scans).map(|_| scan()).collect();
@@ -294,6 +299,7 @@ fn map_with_groups(scans: usize, flagged: f64, rng: &mut Xoshiro256PlusPlus) -> 
         all.push(ScanErrors {
             error_m_s,
             flagged: flags,
+            own_truth_m_s: None,
         });
     }
     map_of(all, SHARED, BAND_M_S)

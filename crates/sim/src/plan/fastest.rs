@@ -58,7 +58,7 @@ fn fastest_of_line(plan: &Plan, line: usize, range_m: &[f64]) -> Result<(f64, f6
         // Fields are not all read for this: the largest speed of their nodes is known.
         beam.time_s = 0.0;
     }
-    let (points_m, velocity_m_s) = known_velocity_m_s(plan, &beam, range_m)?;
+    let (points_m, velocity_m_s) = known_velocity_m_s(&plan.wind, &beam, range_m)?;
     let mut fastest_m_s = 0.0;
     let mut fastest_at_m = plan.scene().scan.range_min_m;
     for (i, point_m) in points_m.iter().enumerate() {

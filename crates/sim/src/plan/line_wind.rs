@@ -6,7 +6,9 @@ use crate::Error;
 use crate::beams::Beam;
 use crate::plan::Plan;
 use crate::plan::geometry::Geometry;
+use crate::plan::wind::SceneWind;
 use crate::scene::{Outside, WindOfPulses};
+use wakescope_les::winds::SampledLine;
 use wakescope_signal::RangeFilter;
 
 /// The air of the layers along a beam.
@@ -40,6 +42,7 @@ pub(crate) fn weighted_at_gates_m_s(
 /// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have airs of their own.
 pub(crate) fn wind_of_line(
     plan: &Plan,
+    wind: &SceneWind,
     filter: &RangeFilter,
     range_m: &[f64],
     line: usize,
@@ -48,14 +51,14 @@ pub(crate) fn wind_of_line(
     let schedule = &g.schedule;
     let pulses = schedule.lines[line].pulses;
     if plan.scene().scan.wind_of_pulses == WindOfPulses::default() {
-        return wind_along(plan, &schedule.middle(line), range_m);
+        return wind_along(plan, wind, &schedule.middle(line), range_m);
     }
     let mut sums_m_s = vec![0.0; range_m.len()];
     let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
     let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
     let share = 1.0 / pulses as f64;
     for pulse in 0..pulses {
-        let here = wind_along(plan, &schedule.beam(line, pulse as f64), range_m)?;
+        let here = wind_along(plan, wind, &schedule.beam(line, pulse as f64), range_m)?;
         let here_seen_m_s = weighted_at_gates_m_s(filter, g, &here.radial_velocity_m_s)?;
         // About the first air, so that the mean of equal airs is that air.
         if pulse == 0 {
@@ -91,23 +94,34 @@ pub(crate) fn wind_of_line(
 /// returns light: below the ground or outside the flow, if the scene masks that.
 pub(crate) fn radial_velocity_m_s(
     plan: &Plan,
+    wind: &SceneWind,
     line: usize,
     range_m: &[f64],
 ) -> Result<Vec<f64>, Error> {
-    velocity_along(plan, &plan.geometry.schedule.middle(line), range_m)
+    velocity_along(plan, wind, &plan.geometry.schedule.middle(line), range_m)
 }
 
 /// The air along a beam.
-pub(crate) fn wind_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<LineWind, Error> {
+pub(crate) fn wind_along(
+    plan: &Plan,
+    wind: &SceneWind,
+    beam: &Beam,
+    range_m: &[f64],
+) -> Result<LineWind, Error> {
     Ok(LineWind {
-        radial_velocity_m_s: velocity_along(plan, beam, range_m)?,
+        radial_velocity_m_s: velocity_along(plan, wind, beam, range_m)?,
         spread_m_s: None,
     })
 }
 
 /// [`known_velocity_m_s`] with what the scene says of places where the flow is not known.
-fn velocity_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<Vec<f64>, Error> {
-    let (points_m, known_m_s) = known_velocity_m_s(plan, beam, range_m)?;
+fn velocity_along(
+    plan: &Plan,
+    wind: &SceneWind,
+    beam: &Beam,
+    range_m: &[f64],
+) -> Result<Vec<f64>, Error> {
+    let (points_m, known_m_s) = known_velocity_m_s(wind, beam, range_m)?;
     let scan = &plan.scene().scan;
     let elevation_rad = beam.elevation_rad;
     let checked = |((&[x_m, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
@@ -141,8 +155,10 @@ fn velocity_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<Vec<f64>,
 type Along = (Vec<[f64; 3]>, Vec<f64>);
 
 /// The radial velocity of the flow along a beam; NaN where it is not known.
+///
+/// Turbulence is summed along lines of equally spaced ranges, which layers and gates are.
 pub(crate) fn known_velocity_m_s(
-    plan: &Plan,
+    wind: &SceneWind,
     beam: &Beam,
     range_m: &[f64],
 ) -> Result<Along, Error> {
@@ -150,15 +166,44 @@ pub(crate) fn known_velocity_m_s(
         .iter()
         .map(|range_m| beam.at_range_m(*range_m))
         .collect();
+    let time_s = wind.start_s + beam.time_s;
+    if let Some(step_m) = equal_step_m(range_m).filter(|_| wind.has_eddies()) {
+        let line = SampledLine {
+            origin_m: points_m[0],
+            direction: beam.direction.0,
+            step_m,
+        };
+        let mut along_m_s = vec![0.0; points_m.len()];
+        wind.wind()
+            .along_line_into(&line, 0, time_s, &mut along_m_s)?;
+        // Air at rest, seen from a lidar that moves.
+        let still_m_s = beam
+            .direction
+            .radial_velocity_m_s([0.0; 3], beam.velocity_m_s);
+        for velocity_m_s in &mut along_m_s {
+            *velocity_m_s += still_m_s;
+        }
+        return Ok((points_m, along_m_s));
+    }
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    plan.wind.wind().velocity_into(
-        &points_m,
-        plan.wind.start_s + beam.time_s,
-        &mut velocity_m_s,
-    )?;
+    wind.wind()
+        .velocity_into(&points_m, time_s, &mut velocity_m_s)?;
     let along = velocity_m_s
         .iter()
         .map(|v| beam.direction.radial_velocity_m_s(*v, beam.velocity_m_s))
         .collect();
     Ok((points_m, along))
+}
+
+/// Distance between ranges that are equally spaced, m.
+fn equal_step_m(range_m: &[f64]) -> Option<f64> {
+    let first_m = range_m.first()?;
+    let last_m = range_m.last()?;
+    let steps = range_m.len() - 1;
+    let step_m = (last_m - first_m) / steps.max(1) as f64;
+    let is_equal = |(i, at_m): (usize, &f64)| {
+        (at_m - first_m - i as f64 * step_m).abs() <= 1e-9 * last_m.abs()
+    };
+    let is_spaced = steps > 0 && step_m > 0.0 && range_m.iter().enumerate().all(is_equal);
+    is_spaced.then_some(step_m)
 }

@@ -5,6 +5,7 @@
 
 use crate::plan::Plan;
 use crate::plan::estimators::grid_step_and_bias_m_s;
+use crate::scene::EddyDecorrelation;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 
 /// Least shift of velocities by the pulse that is reported, m/s.
@@ -37,6 +38,8 @@ pub(super) fn of_scene(plan: &Plan) -> Result<Vec<String>, Error> {
         out.push("one realisation: no standard deviation can be given".into());
     }
     out.extend(of_ambiguous_ranges(plan));
+    out.extend(of_frozen_eddies(plan));
+    out.extend(of_low_profiles(plan));
     let (first_m, blind_m) = (scene.scan.range_min_m, scene.telescope.blind_range_m);
     if first_m < blind_m {
         out.push(format!("scan.range_min_m = {first_m}: nothing is seen up to telescope.blind_range_m, {blind_m} m"));
@@ -60,6 +63,39 @@ fn of_fast_air(plan: &Plan) -> Option<String> {
              air is not seen"
         )
     })
+}
+
+/// Turbulence that is frozen for longer than its large eddies live.
+fn of_frozen_eddies(plan: &Plan) -> Option<String> {
+    let eddies = plan.scene().eddies()?;
+    let frozen = eddies.decorrelation == EddyDecorrelation::None;
+    let lifetime_s = eddies.outer_scale_m / eddies.spectrum()?.variance_m2_s2().sqrt();
+    let scan_s = plan.scan_end_s() - plan.wind.start_s;
+    (frozen && scan_s > lifetime_s).then(|| {
+        format!(
+            "the eddies are frozen for {scan_s:.0} s, longer than outer_scale_m over their standard deviation, {lifetime_s:.0} s, after \
+             which those of real air have changed: decorrelation = \"sweeping\" changes them"
+        )
+    })
+}
+
+/// Tables of the wind that end below the scan.
+fn of_low_profiles(plan: &Plan) -> Vec<String> {
+    let schedule = &plan.geometry.schedule;
+    let range_m = plan.scene().scan.range_max_m;
+    let heights_m = (0..schedule.lines.len()).map(|i| schedule.middle(i).at_range_m(range_m)[2]);
+    let highest_m = heights_m.fold(0.0, f64::max);
+    let mut out = Vec::new();
+    for wind in plan.scene().mean_winds() {
+        if let Some(&last_m) = wind.height_m.last()
+            && last_m < highest_m
+        {
+            out.push(format!(
+                "height_m of the wind ends at {last_m} m, the scan at {highest_m:.0} m: above, the wind is that of the last height"
+            ));
+        }
+    }
+    out
 }
 
 /// A pulse whose own mean frequency shifts all velocities.

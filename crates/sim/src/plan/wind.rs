@@ -4,17 +4,24 @@
 //! the nodes it is interpolated by (26), between the times linearly. Outside its mesh the velocity is NaN, which the scan
 //! treats as the scene says. Check: a scanned map shows the flow as sampled from the planes, frozen and moving.
 
+mod eddies;
 mod fields;
 mod planes;
 
 use crate::Error;
 use crate::scene::{CoreProfile, Flow, SceneFile, SimulatedMotion, VortexMotion, VortexPair};
 use std::fmt;
+use std::sync::Arc;
 use wakescope_les::{self as les, Wind};
 
 /// The wind of a scene, with what the run needs to know of it.
+#[derive(Clone)]
 pub struct SceneWind {
-    wind: Box<dyn Wind>,
+    /// Everything but the turbulence.
+    steady: Arc<dyn Wind>,
+    /// The whole wind.
+    wind: Arc<dyn Wind>,
+    has_eddies: bool,
     /// Time of the flow when the scan begins, s.
     pub start_s: f64,
     /// Age of the wake then, in tau; 0 where there is no wake.
@@ -43,13 +50,42 @@ impl SceneWind {
     pub fn new(file: &SceneFile) -> Result<Self, Error> {
         let mut whole = Self::of_flow(&file.content.flow, file)?;
         for (i, flow) in file.content.added_flows.iter().enumerate() {
+            if matches!(flow, Flow::Eddies(_)) {
+                continue;
+            }
             let added = Self::of_flow(flow, file).map_err(|source| Error::OfAddedFlow {
                 number: i,
                 source: Box::new(source),
             })?;
             whole = whole.plus(added);
         }
-        Ok(whole)
+        whole.with_eddies_of(file, 0)
+    }
+
+    /// The same wind with the turbulence of a realisation.
+    ///
+    /// # Errors
+    /// What the turbulence refuses; a checked scene gives none.
+    pub(crate) fn with_eddies_of(
+        &self,
+        file: &SceneFile,
+        realisation: usize,
+    ) -> Result<Self, Error> {
+        let Some(eddies) = eddies::eddies(&file.content, realisation)? else {
+            return Ok(self.clone());
+        };
+        let start_s = self.start_s;
+        let later = Retimed {
+            wind: Box::new(eddies),
+            time_s: move |time_s| time_s - start_s,
+        };
+        Ok(Self {
+            wind: Arc::new(les::winds::Sum {
+                winds: vec![Box::new(self.steady.clone()), Box::new(later)],
+            }),
+            has_eddies: true,
+            ..self.clone()
+        })
     }
 
     fn of_flow(flow: &Flow, file: &SceneFile) -> Result<Self, Error> {
@@ -72,16 +108,18 @@ impl SceneWind {
     fn plus(self, other: Self) -> Self {
         let by_s = other.start_s - self.start_s;
         let later = Box::new(Retimed {
-            wind: other.wind,
+            wind: Box::new(other.steady),
             time_s: move |time_s| time_s + by_s,
         });
         let mut field_times_s = self.field_times_s;
         field_times_s.extend(other.field_times_s.iter().map(|t| t - by_s));
         field_times_s.sort_by(f64::total_cmp);
+        let wind: Arc<dyn Wind> = Arc::new(les::winds::Sum {
+            winds: vec![Box::new(self.steady), later],
+        });
         Self {
-            wind: Box::new(les::winds::Sum {
-                winds: vec![self.wind, later],
-            }),
+            steady: wind.clone(),
+            wind,
             end_s: self.end_s.min(other.end_s - by_s),
             max_speed_m_s: self.max_speed_m_s + other.max_speed_m_s,
             source: format!("{}; added: {}", self.source, other.source),
@@ -92,8 +130,11 @@ impl SceneWind {
 
     /// A wind without an end.
     fn of(wind: Box<dyn Wind>, source: String) -> Self {
+        let wind: Arc<dyn Wind> = Arc::from(wind);
         Self {
+            steady: wind.clone(),
             wind,
+            has_eddies: false,
             start_s: 0.0,
             tau: 0.0,
             end_s: f64::INFINITY,
@@ -151,6 +192,16 @@ impl SceneWind {
     pub fn wind(&self) -> &dyn Wind {
         &*self.wind
     }
+
+    /// The wind without the turbulence of `"eddies"`.
+    pub fn without_eddies(&self) -> &dyn Wind {
+        &*self.steady
+    }
+
+    /// Whether there is turbulence, which is summed along lines.
+    pub(crate) fn has_eddies(&self) -> bool {
+        self.has_eddies
+    }
 }
 
 /// A wind that is asked for at other times.
@@ -170,6 +221,17 @@ impl<T: Fn(f64) -> f64 + Send + Sync> Wind for Retimed<T> {
             .velocity_into(points_m, (self.time_s)(time_s), out_m_s)
     }
 
+    fn along_line_into(
+        &self,
+        line: &les::winds::SampledLine,
+        first: usize,
+        time_s: f64,
+        out_m_s: &mut [f64],
+    ) -> Result<(), les::Error> {
+        self.wind
+            .along_line_into(line, first, (self.time_s)(time_s), out_m_s)
+    }
+
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
         self.wind.max_gradient_per_s((self.time_s)(time_s))
     }
@@ -181,7 +243,11 @@ impl<T: Fn(f64) -> f64 + Send + Sync> Wind for Retimed<T> {
 /// What the wind refuses; a checked scene gives none.
 fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
     Ok(match flow {
-        Flow::Calm {} | Flow::Simulated(_) | Flow::Fields(_) => Box::<les::winds::Sum>::default(),
+        // Turbulence is added to the sum of all other flows.
+        Flow::Calm {} | Flow::Eddies(_) | Flow::Simulated(_) | Flow::Fields(_) => {
+            Box::<les::winds::Sum>::default()
+        }
+        Flow::Wind(wind) => Box::new(wind.simulated()?),
         Flow::Uniform {
             lateral_m_s,
             vertical_m_s,

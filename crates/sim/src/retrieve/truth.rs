@@ -165,7 +165,8 @@ fn simulated(plan: &Plan, lines: &[usize], side: Side) -> Result<VortexResult, E
         let first_m = if side == Side::Left { left } else { right };
         centroid(plan, time_s, first_m, sense, reach_m)
     })?;
-    let mean_m2_s = mean_circulation_5_15_m2_s(plan.wind.wind(), [y_m, z_m], time_s, CIRCLE)?;
+    let wind = plan.wind.without_eddies();
+    let mean_m2_s = mean_circulation_5_15_m2_s(wind, [y_m, z_m], time_s, CIRCLE)?;
     Ok(exact(side, passage, [f64::NAN, sense * mean_m2_s], None))
 }
 
@@ -190,7 +191,7 @@ fn vorticity(
     }
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
     plan.wind
-        .wind()
+        .without_eddies()
         .velocity_into(&points_m, time_s, &mut velocity_m_s)?;
     let mut known = Vec::new();
     for row in 1..rows.saturating_sub(1) {

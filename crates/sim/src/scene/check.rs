@@ -24,14 +24,10 @@ impl Scene {
         self.check_limits("", &mut c);
         self.check_instrument(&mut c);
         self.check_receiver(&mut c);
-        let added = self
-            .added_flows
-            .iter()
-            .enumerate()
-            .map(|(i, flow)| (format!("added_flows[{i}]"), flow));
-        for (at, flow) in std::iter::once(("flow".to_owned(), &self.flow)).chain(added) {
+        for (at, flow) in self.flows() {
             check_flow(flow, &at, &mut c);
         }
+        self.check_air(&mut c);
         self.check_head(&mut c);
         check_estimator(self, &mut c);
         check_retrieval(self, &mut c);

@@ -1,6 +1,7 @@
 //! The winds of a scene, that of `[flow]` and those that are added to it, and what they may say.
 //! Check: each limit is broken once.
 
+use super::air::{EddyField, WindProfile, check_eddies, check_wind_profile};
 use crate::keys::{Checker, Named, keys};
 use std::f64::consts::TAU;
 use wakescope_estimate::vortex_fit::CoreProfile;
@@ -19,6 +20,10 @@ keys! {
         },
         /// A wind that is linear in place and time.
         "linear" => Linear(LinearWind),
+        /// A horizontal wind that depends on the height.
+        "wind" => Wind(WindProfile),
+        /// Turbulence with the spectrum of von Karman.
+        "eddies" => Eddies(EddyField),
         /// The analytic vortex pair (3)-(5) with its images below the ground.
         "vortex_pair" => VortexPair(VortexPair),
         /// Cross-planes that `wakescope flow` wrote.
@@ -211,6 +216,8 @@ pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
                 allowed,
             );
         }
+        Flow::Wind(wind) => check_wind_profile(wind, at, c),
+        Flow::Eddies(eddies) => check_eddies(eddies, at, c),
         Flow::Simulated(flow) => {
             c.require(
                 flow.motion != SimulatedMotion::Carried,
@@ -251,6 +258,9 @@ pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
 impl super::Scene {
     /// Whether the air is at rest everywhere.
     pub(crate) fn is_calm(&self) -> bool {
-        matches!(self.flow, Flow::Calm {}) && self.added_flows.is_empty()
+        let is_none =
+            |flow: &Flow| matches!(flow, Flow::Eddies(eddies) if eddies.dissipation_m2_s3 == 0.0);
+        let has_flow = !matches!(self.flow, Flow::Calm {}) && !is_none(&self.flow);
+        !has_flow && self.added_flows.iter().all(is_none)
     }
 }

@@ -5,6 +5,7 @@
 //! a test holds it equal to [`Scene::default`]. Unknown keys are refused. Units are in the key
 //! names; a key without a unit has none.
 
+mod air;
 mod atmosphere;
 mod check;
 mod estimator;
@@ -22,6 +23,7 @@ pub use crate::document::{Content, Document};
 pub use crate::io::Site;
 pub use crate::io::hash_of;
 pub use crate::keys::{Problem, SceneError};
+pub use air::*;
 pub use atmosphere::*;
 pub use estimator::*;
 pub use flow::*;

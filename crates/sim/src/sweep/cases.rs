@@ -548,17 +548,33 @@ fn text_of(table: &Table) -> String {
         .unwrap_or_else(|e| unreachable!("a table that was read can be written: {e}"))
 }
 
-/// Sets a key, with the tables above it where they are missing.
+/// Sets a key, with the tables above it where they are missing. A number in the path is that of a table of a list; a list that
+/// has no such table gets one with this key alone, which is refused when the scene is read, as is what is no table.
 pub(crate) fn set(table: &mut Table, path: &str, value: Value) {
-    let (above, last) = path.rsplit_once('.').unwrap_or(("", path));
-    let inner = above.split_terminator('.').try_fold(table, |table, key| {
-        table
-            .entry(key)
-            .or_insert_with(|| Value::Table(Table::new()))
-            .as_table_mut()
-    });
-    // What is no table there is refused when the scene is read.
-    inner.map(|table| table.insert(last.into(), value));
+    let Some((first, rest)) = path.split_once('.') else {
+        table.insert(path.into(), value);
+        return;
+    };
+    let is_list = rest.starts_with(|letter: char| letter.is_ascii_digit());
+    let missing = if is_list {
+        Value::Array(Vec::new())
+    } else {
+        Value::Table(Table::new())
+    };
+    match table.entry(first).or_insert(missing) {
+        Value::Table(inner) => set(inner, rest, value),
+        Value::Array(list) => {
+            let (index, rest) = rest.split_once('.').unwrap_or((rest, ""));
+            let index = index.parse().unwrap_or(list.len()).min(list.len());
+            if index == list.len() {
+                list.push(Value::Table(Table::new()));
+            }
+            if let Value::Table(inner) = &mut list[index] {
+                set(inner, rest, value);
+            }
+        }
+        _ => {}
+    }
 }
 
 /// The number of a name in an expression.

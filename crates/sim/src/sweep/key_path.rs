@@ -1,6 +1,7 @@
 //! From a key as a user writes it to the key of the scene that it names, and from texts to values of it.
 //!
 //! A path may omit tables in its middle where only one key fits: `pulse.duration_s` is `pulse.shape.duration_s`.
+//! `added_flows.0.lateral_m_s` is a key of the first added flow.
 //! Check: every key that can vary is found by its whole path; those that cannot are refused with the reason.
 
 use crate::keys::{Key, Kind, Problem, join, near, one_of};
@@ -66,9 +67,23 @@ fn shortens(short: &str, path: &str) -> bool {
 
 /// The key that a path names; `value` is what it was to be, for the message.
 pub(super) fn resolve(written: &str, value: &str) -> Result<SceneKey, Problem> {
-    varying_key(written)
-        .cloned()
-        .map_err(|allowed| Problem::new(written, value, allowed))
+    let refused = |allowed| Problem::new(written, value, allowed);
+    let Some((index, key)) = added_flow(written) else {
+        return varying_key(written).cloned().map_err(refused);
+    };
+    // An added flow has the keys of the first one.
+    let flow = varying_key(&format!("flow.{key}")).map_err(refused)?;
+    let own = flow.path.split_once('.').map_or("", |(_, own)| own);
+    Ok(SceneKey {
+        path: format!("added_flows.{index}.{own}"),
+        kind: flow.kind.clone(),
+    })
+}
+
+/// Number and key of an added flow.
+fn added_flow(written: &str) -> Option<(usize, &str)> {
+    let (index, key) = written.strip_prefix("added_flows.")?.split_once('.')?;
+    Some((index.parse().ok()?, key))
 }
 
 fn varying_key(written: &str) -> Result<&'static SceneKey, String> {
@@ -255,6 +270,10 @@ mod tests {
             ("atmosphere.cn2_m_m23", "atmosphere.turbulence.cn2_m_m23"),
             ("detector.reference", "detector.snr.reference"),
             ("estimator.order", "estimator.method.order"),
+            (
+                "added_flows.2.dissipation_m2_s3",
+                "added_flows.2.dissipation_m2_s3",
+            ),
         ] {
             assert_eq!(resolve(short, "1").unwrap().path, path);
         }

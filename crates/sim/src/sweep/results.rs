@@ -113,7 +113,11 @@ impl<'p> Collected<'p> {
                         left_m.min(right_m) / pair.spacing_m
                     }
                     Flow::Simulated(_) | Flow::Fields(_) => f64::NAN,
-                    Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => f64::INFINITY,
+                    Flow::Calm {}
+                    | Flow::Uniform { .. }
+                    | Flow::Linear(_)
+                    | Flow::Wind(_)
+                    | Flow::Eddies(_) => f64::INFINITY,
                 }
             });
         let mut own = Self {
@@ -205,10 +209,14 @@ impl<'p> Collected<'p> {
         out.extend(flagged_fraction(map));
         out.push(f64::from(u8::from(self.has_rough_errors(map))));
         let mut errors_m_s = Vec::with_capacity(self.velocity_m_s.len());
-        for (velocity_m_s, cell) in self.velocity_m_s.iter().zip(self.apart.iter().cycle()) {
-            let truth_m_s = map.v_gate_m_s[*cell];
-            if truth_m_s.is_finite() {
-                errors_m_s.push(velocity_m_s - truth_m_s);
+        let scans = self.velocity_m_s.chunks(self.apart.len().max(1));
+        for (realisation, scan) in scans.enumerate() {
+            let truth = map.gate_truth_m_s(realisation);
+            for (velocity_m_s, cell) in scan.iter().zip(&self.apart) {
+                let truth_m_s = truth[*cell];
+                if truth_m_s.is_finite() {
+                    errors_m_s.push(velocity_m_s - truth_m_s);
+                }
             }
         }
         out.extend(bad_fraction(plan, &errors_m_s)?);

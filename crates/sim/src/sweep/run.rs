@@ -251,11 +251,14 @@ impl Common {
     /// # Errors
     /// As [`Plan::new`].
     pub(crate) fn plan(&self, scene: &SceneFile, target: Target) -> Result<Plan, Error> {
+        // Turbulence is drawn with the seed.
+        let seed = scene.content.eddies().map(|_| scene.content.seed);
         let cause = hash_of(&format!(
             "{:?}",
             (
                 &scene.content.flow,
                 &scene.content.added_flows,
+                seed,
                 scene.folder()
             )
         ));

@@ -280,6 +280,29 @@ fn seeds_share_an_efficiency_where_no_screens_are_drawn() {
 }
 
 #[test]
+fn keys_of_added_flows_vary_and_turbulence_follows_the_seed() {
+    let eddies = format!("{SMALL}[[added_flows]]\nkind = \"eddies\"\n");
+    let found = sweep(&eddies, &vary(&["added_flows.0.dissipation_m2_s3=0,1e-3"])).unwrap();
+    let dissipations = found.cases.iter().map(|case| {
+        let flow = &case.scene.content.added_flows[0];
+        let crate::scene::Flow::Eddies(eddies) = flow else {
+            panic!("{flow:?}")
+        };
+        eddies.dissipation_m2_s3
+    });
+    assert_eq!(dissipations.collect::<Vec<_>>(), [0.0, 1e-3]);
+    assert!(sweep(&eddies, &vary(&["added_flows.1.dissipation_m2_s3=0,1e-3"])).is_err());
+    let common = super::run::Common::default();
+    let fastest_m_s = [1, 2].map(|seed| {
+        let text = format!("seed = {seed}\n{eddies}");
+        let file = SceneFile::parse(&text, Path::new("s.toml")).unwrap();
+        let plan = common.plan(&file, crate::plan::Target::Map).unwrap();
+        plan.fastest_m_s
+    });
+    assert!(fastest_m_s[0] != fastest_m_s[1]);
+}
+
+#[test]
 fn maps_of_scenes_together_are_those_of_each_alone() {
     let scene = |text: &str| SceneFile::parse(text, Path::new("s.toml")).unwrap();
     let other = format!("seed = 2\n{SMALL}[estimator]\nradius_m = 1.0\n");

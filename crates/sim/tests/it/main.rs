@@ -6,6 +6,7 @@
 mod accumulation;
 #[cfg(all(feature = "cli", feature = "plots"))]
 mod accuracy;
+mod air;
 #[cfg(all(feature = "cli", feature = "plots"))]
 mod book;
 #[cfg(feature = "cli")]

@@ -5,7 +5,7 @@
 //!
 //! Check: estimates from draws against those from records, `tests/it/accumulation.rs`; same bytes for one thread and two.
 
-use super::{PIECE_BYTES, Scanner};
+use super::{PIECE_BYTES, ScanAir, Scanner};
 use crate::Error;
 use crate::progress::Observer;
 use crate::streams::stream;
@@ -52,13 +52,19 @@ impl<'s, 'p, T: Sample> LineDraws<'s, 'p, T> {
     ) -> Result<Self, Error> {
         let samples = scanner.simulator.record().samples;
         let factor_bytes = samples * samples * size_of::<T>();
-        let kept = kept_factors(scanner.lines.len(), factor_bytes, realisations);
+        // Realisations with turbulence of their own share no covariance.
+        let shared = if scanner.plan.scene().has_air_of_each_realisation() {
+            1
+        } else {
+            realisations
+        };
+        let kept = kept_factors(scanner.air.lines.len(), factor_bytes, shared);
         Ok(Self {
             scanner,
             lags: lags.min(samples),
             kept: (0..kept)
                 .into_par_iter()
-                .map(|line| scanner.products_of_line(line))
+                .map(|line| scanner.products_of_line(&scanner.air, line))
                 .collect::<Result<_, Error>>()?,
         })
     }
@@ -74,14 +80,15 @@ impl<'s, 'p, T: Sample> LineDraws<'s, 'p, T> {
         observer: &dyn Observer,
         mut sink: impl FnMut(usize, &[Array2<T>]) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let lines = self.scanner.lines.len();
+        let own = self.scanner.own_air(realisation)?;
+        let lines = self.scanner.air.lines.len();
         let samples = self.scanner.simulator.record().samples;
         let size = lines_at_once(lines, samples * self.lags * size_of::<T>());
         for first in (0..lines).step_by(size) {
             let last = (first + size).min(lines);
             let products = (first..last)
                 .into_par_iter()
-                .map(|line| self.draw(realisation, line, observer))
+                .map(|line| self.draw(realisation, own.as_ref(), line, observer))
                 .collect::<Result<Vec<_>, Error>>()?;
             sink(first, &products)?;
         }
@@ -91,15 +98,16 @@ impl<'s, 'p, T: Sample> LineDraws<'s, 'p, T> {
     fn draw(
         &self,
         realisation: usize,
+        own: Option<&ScanAir>,
         line: usize,
         observer: &dyn Observer,
     ) -> Result<Array2<T>, Error> {
         let scanner = self.scanner;
         let made;
         let prepared = match self.kept.get(line) {
-            Some(kept) => kept,
-            None => {
-                made = scanner.products_of_line(line)?;
+            Some(kept) if own.is_none() => kept,
+            _ => {
+                made = scanner.products_of_line(own.unwrap_or(&scanner.air), line)?;
                 &made
             }
         };
@@ -115,10 +123,14 @@ impl<'s, 'p, T: Sample> LineDraws<'s, 'p, T> {
 
 impl Scanner<'_> {
     /// Factors the covariance of the records of a line.
-    fn products_of_line<T: Sample>(&self, line: usize) -> Result<AccumulatedProducts<T>, Error> {
+    fn products_of_line<T: Sample>(
+        &self,
+        air: &ScanAir,
+        line: usize,
+    ) -> Result<AccumulatedProducts<T>, Error> {
         let shot = Shot {
-            previous: self.previous.as_ref().map(|lines| &lines[line]),
-            ..Shot::from(&self.lines[line])
+            previous: air.previous.as_ref().map(|lines| &lines[line]),
+            ..Shot::from(&air.lines[line])
         };
         AccumulatedProducts::new(&self.simulator, shot).map_err(|source| Error::OfLine {
             line,

@@ -9,12 +9,13 @@ use crate::io::fields_input::{FieldPlace, places, read};
 use crate::io::planes_input::files;
 use crate::plan::wind::SceneWind;
 use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
+use std::sync::Arc;
 use wakescope_les::winds::{Edges, Series, Side, VolumeComponent, VolumeSnapshot};
 use wakescope_les::{Error as LesError, Wind};
 
 /// A wind in axes of its own.
 struct Placed {
-    wind: Box<dyn Wind>,
+    wind: Arc<dyn Wind>,
     /// Position of the origin of the axes at `start_s`.
     origin_m: [f64; 3],
     /// Velocity of the origin along x and y.
@@ -222,23 +223,22 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
         && (sin, cos) == (0.0, 1.0)
         && !flow.mirror_y
         && flow.carried_m_s == [0.0; 2];
-    let placed = |wind| {
-        Box::new(Placed {
-            wind,
+    let wind: Arc<dyn Wind> = if plain {
+        found.steady
+    } else {
+        Arc::new(Placed {
+            wind: found.steady,
             origin_m: flow.origin_m,
             carried_m_s: flow.carried_m_s,
             start_s,
             sin,
             cos,
             side,
-        }) as Box<dyn Wind>
+        })
     };
     Ok(SceneWind {
-        wind: if plain {
-            found.wind
-        } else {
-            placed(found.wind)
-        },
+        steady: wind.clone(),
+        wind,
         max_speed_m_s: fastest_m_s,
         field_times_s: if found.end_s.is_finite() {
             times_s
