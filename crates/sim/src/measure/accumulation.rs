@@ -69,20 +69,25 @@ pub(crate) fn record_s(plan: &Plan) -> f64 {
 /// Time to factor the covariance of the records of a line, s of one core.
 pub(crate) fn factor_s(plan: &Plan) -> f64 {
     let n = &plan.counts;
-    let pairs = n.samples * n.samples.min(lit_samples(plan));
-    pairs * n.layers_per_sample * 1e-9 + n.samples.powi(2) * 2e-8 + n.samples.powi(3) * 1.5e-10
-}
-
-/// Samples that a layer of air contributes to.
-fn lit_samples(plan: &Plan) -> f64 {
     let g = &plan.geometry;
-    plan.counts.layers_per_sample * g.layer_thickness_m / g.sample_spacing_m
+    // Samples that one layer contributes to, and the mean share of its layers that two of them have.
+    let lit = n.layers_per_sample * g.layer_thickness_m / g.sample_spacing_m;
+    let near = n.samples.min(lit);
+    let pairs = near * (1.0 - 0.5 * near / lit);
+    let covariance_s = n.samples * n.layers_per_sample * (2.5e-8 + pairs * 3e-10);
+    let cubic_s = if n.parts > 1.0 { 3.5e-10 } else { 8e-11 };
+    covariance_s + n.samples.powi(2) * n.parts * 1e-8 + n.samples.powi(3) * cubic_s
 }
 
 /// Time to draw the products of a line, s of one core.
 pub(crate) fn draw_s(plan: &Plan) -> f64 {
     let n = &plan.counts;
-    n.parts * (n.samples.powi(2) * 1e-8 + n.samples.powi(3) * 2e-11)
+    let [square_s, cubic_s] = if n.parts > 1.0 {
+        [2e-8, 2.4e-10]
+    } else {
+        [5e-9, 3.2e-11]
+    };
+    n.samples.powi(2) * square_s + n.samples.powi(3) * cubic_s
 }
 
 /// Memory of the factor of a line, bytes.

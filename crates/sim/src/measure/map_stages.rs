@@ -163,10 +163,10 @@ fn estimates_s(plan: &Plan) -> f64 {
         _ => 0.0,
     };
     let planned_s = 4e-8 * (method.covariances() * window.powi(3) + bounded);
-    let pictures_s = 0.25 * f64::from(u8::from(scene.outputs.svg) + u8::from(scene.outputs.png));
+    let pictures_s = 0.12 * f64::from(u8::from(scene.outputs.svg) + u8::from(scene.outputs.png));
     let windows = n.realisations * windows_per_record(plan);
     let windows_s = match of_pulses(plan) {
-        Pulses::Drawn => windows * n.lines * numbers * window * 1e-9,
+        Pulses::Drawn => windows * n.lines * numbers * window * 4e-10,
         Pulses::Records(_) => windows * n.records * window_s,
     };
     windows_s + points_s + planned_s + n.cells * 3e-6 + pictures_s

@@ -95,7 +95,8 @@ mod tests {
             ))
             .memory_bytes()
         };
-        let (few, many) = (memory(100, ""), memory(1_000_000, ""));
+        let few = memory(1000, "");
+        let many = memory(1_000_000, "");
         assert!(many < 1.01 * few && many < 2e8, "{few} {many}");
         // Signals are kept once, in double precision.
         let geometry = &plan("").geometry;

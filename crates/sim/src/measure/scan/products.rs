@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use wakescope_signal::{AccumulatedProducts, Sample, Shot};
 
 /// Memory of the factors that are kept, bytes.
-pub(crate) const FACTORS_BYTES: usize = 256 << 20;
+pub(crate) const FACTORS_BYTES: usize = 96 << 20;
 
 /// Lines whose factors are kept for a number of realisations.
 pub(crate) fn kept_factors(lines: usize, factor_bytes: usize, realisations: usize) -> usize {
