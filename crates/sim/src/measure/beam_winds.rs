@@ -32,7 +32,8 @@ pub struct BeamWind {
     pub std_m_s: [f64; 3],
     /// Wind from the true velocities weighted with the pulse, m/s: what beams without noise would tell.
     pub noiseless_m_s: [f64; 3],
-    /// True wind above the lidar at that height and time, m/s; NaN where it is not known.
+    /// True wind above the lidar at that height and time, m/s, without the turbulence of `"eddies"`: the mean wind is what a scan is
+    /// to find. NaN where it is not known.
     pub true_m_s: [f64; 3],
 }
 
@@ -69,7 +70,7 @@ pub fn beam_winds(plan: &Plan, map: &VelocityEstimates) -> Result<Option<Vec<Bea
                 [beam.position_m[0], beam.position_m[1], height_m]
             });
             plan.wind
-                .wind()
+                .without_eddies()
                 .velocity_into(&[above_m], time_s, &mut truth)?;
             out.push(BeamWind {
                 sweep,

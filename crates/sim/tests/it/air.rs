@@ -322,6 +322,22 @@ fn long_frozen_eddies_and_low_tables_are_warned_of() {
     );
 }
 
+#[test]
+fn the_true_wind_of_a_vad_is_the_mean_wind() {
+    let text = "[flow]\nkind = \"wind\"\nprofile = \"power\"\nexponent = 0.0\ntoward_rad = 0.0\nspeed_m_s = 6.0\n\
+                [[added_flows]]\nkind = \"eddies\"\n[scan]\npattern = { kind = \"vad\", beams = 6 }\npulses_per_line = 2\n\
+                realisations = 2\nrange_max_m = 330.0\n";
+    let plan = Plan::new(file(text), Target::Map).unwrap();
+    let map = run(&plan, &Silent).unwrap().map.unwrap();
+    let winds = wakescope_sim::measure::beam_winds::beam_winds(&plan, &map).unwrap();
+    let winds = winds.unwrap();
+    assert!(!winds.is_empty());
+    for wind in winds {
+        assert_eq!(wind.true_m_s, [6.0, 0.0, 0.0]);
+        assert_ne!(wind.noiseless_m_s, wind.true_m_s);
+    }
+}
+
 /// The scene of the page, with fewer lines.
 #[test]
 fn the_airport_of_the_page_runs() {
