@@ -31,6 +31,15 @@ const BISTATIC: [(&str, &str); 3] = [
     ("telescope.receiver", "\"bistatic\""),
 ];
 const FRONT: [(&str, &str); 1] = [("detector.front_end.half_power_hz", "1e8")];
+const TRANSPORTED: [(&str, &str); 2] =
+    [("flow.motion", "\"transported\""), ("flow.age_tau", "4.0")];
+const HAZE: [(&str, &str); 1] = [("atmosphere.aerosol.kind", "\"visibility\"")];
+const LAYER: [(&str, &str); 1] = [("atmosphere.aerosol.kind", "\"layer\"")];
+const HUFNAGEL: [(&str, &str); 3] = [
+    ("atmosphere.turbulence.kind", "\"refractive\""),
+    ("atmosphere.turbulence.profile.kind", "\"hufnagel_valley\""),
+    ("telescope.receiver", "\"bistatic\""),
+];
 const PPI: [(&str, &str); 1] = [("scan.lidar_height_m", "20.0")];
 
 const KEYS: &[Key] = &[
@@ -296,6 +305,88 @@ const KEYS: &[Key] = &[
         "v_mean_m_s",
     ),
     (
+        "atmosphere.aerosol",
+        &[],
+        ["{ kind = \"visibility\" }", "{ kind = \"layer\" }"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.aerosol.visibility_m",
+        &HAZE,
+        ["5e3", "2e4"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.aerosol.lidar_ratio_sr",
+        &HAZE,
+        ["30.0", "60.0"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.aerosol.ground_backscatter_per_m_sr",
+        &LAYER,
+        ["1e-6", "2e-6"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.aerosol.scale_height_m",
+        &LAYER,
+        ["500.0", "3000.0"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.aerosol.top_m",
+        &LAYER,
+        ["40.0", "900.0"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.aerosol.step_m",
+        &[
+            ("atmosphere.aerosol.kind", "\"layer\""),
+            ("atmosphere.aerosol.top_m", "40.0"),
+        ],
+        ["10.0", "60.0"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.aerosol.above_backscatter_per_m_sr",
+        &[
+            ("atmosphere.aerosol.kind", "\"layer\""),
+            ("atmosphere.aerosol.top_m", "20.0"),
+        ],
+        ["1e-8", "1e-7"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.turbulence.profile",
+        &[
+            ("atmosphere.turbulence.kind", "\"refractive\""),
+            ("telescope.receiver", "\"bistatic\""),
+        ],
+        [
+            "{ kind = \"hufnagel_valley\" }",
+            "{ kind = \"table\", heights_m = [0.0, 100.0], values_m_m23 = [1e-13, 1e-14] }",
+        ],
+        "budget",
+        "",
+    ),
+    (
+        "atmosphere.turbulence.profile.ground_cn2_m_m23",
+        &HUFNAGEL,
+        ["1e-14", "1e-13"],
+        "budget",
+        "",
+    ),
+    (
         "atmosphere.turbulence.cn2_m_m23",
         &REFRACTIVE,
         ["1e-13", "2e-13"],
@@ -355,6 +446,75 @@ const KEYS: &[Key] = &[
         "flow.motion",
         &[],
         ["\"frozen\"", "\"inviscid\""],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.decay",
+        &TRANSPORTED,
+        ["{ law = \"two_phase\" }", "{ law = \"sarpkaya\" }"],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.decay.slow",
+        &[
+            ("flow.motion", "\"transported\""),
+            ("flow.age_tau", "4.0"),
+            ("flow.decay.law", "\"two_phase\""),
+        ],
+        ["0.06", "0.1"],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.decay.fast",
+        &[
+            ("flow.motion", "\"transported\""),
+            ("flow.age_tau", "4.0"),
+            ("flow.lifetime_tau", "2.0"),
+            ("flow.decay.law", "\"two_phase\""),
+        ],
+        ["0.4", "0.6"],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.decay.rate",
+        &[
+            ("flow.motion", "\"transported\""),
+            ("flow.age_tau", "4.0"),
+            ("flow.decay.law", "\"sarpkaya\""),
+        ],
+        ["0.45", "0.6"],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.lifetime_tau",
+        &TRANSPORTED,
+        ["1.0", "3.0"],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.dissipation_m2_s3",
+        &TRANSPORTED,
+        ["1e-4", "1e-2"],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.buoyancy_per_s",
+        &TRANSPORTED,
+        ["0.0", "0.02"],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.rebound",
+        &TRANSPORTED,
+        ["false", "true"],
         "map",
         "v_exact_m_s",
     ),

@@ -5,34 +5,19 @@
 #![allow(clippy::print_stdout)]
 
 use std::ops::ControlFlow;
+use wakescope_optics::air::hufnagel_valley_m_m23;
 use wakescope_optics::monte_carlo::Sampling;
 use wakescope_optics::plan::Case;
 use wakescope_optics::theory::{bistatic_efficiency, free_space_efficiency_misaligned};
 use wakescope_optics::{Cn2Path, Misalignment, MonteCarlo, Stop, Telescope, Turbulence};
-
-/// Cn2 \[m^(-2/3)\] of Hufnagel and Valley, 5/7.
-fn hufnagel_valley(height_m: f64) -> f64 {
-    let high =
-        0.00594 * (21f64 / 27.0).powi(2) * (1e-5 * height_m).powi(10) * (-height_m / 1000.0).exp();
-    high + 2.7e-16 * (-height_m / 1500.0).exp() + 1.7e-14 * (-height_m / 100.0).exp()
-}
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let mut next = |default: f64| arguments.next().map_or(Ok(default), |a| a.parse::<f64>());
     let (elevation_deg, tilt_rad, relative_error) = (next(30.0)?, next(5e-6)?, next(0.02)?);
 
-    let height_m: Vec<f64> = (0..=200)
-        .map(|i| 3100.0 * (f64::from(i) / 200.0).powi(2))
-        .collect();
-    let cn2_m_m23 = height_m.iter().map(|&h| hufnagel_valley(h)).collect();
-    let elevation_rad = elevation_deg.to_radians();
-    let cn2 = Cn2Path::Heights {
-        height_m,
-        cn2_m_m23,
-        telescope_height_m: 2.0,
-        elevation_rad,
-    };
+    let law = |height_m: f64| hufnagel_valley_m_m23(height_m, 21.0, 1.7e-14);
+    let cn2 = Cn2Path::from_law(law, 2.0, elevation_deg.to_radians());
     let turbulence = Turbulence {
         cn2,
         ..Turbulence::none()

@@ -31,7 +31,8 @@
 //! | `pulse` | [`Pulse`]: [`GaussianPulse`] (7) or sampled; its moments and range weight, and the layers it needs |
 //! | [`sampled`] | [`SampledPulse`](sampled::SampledPulse): any envelope given by samples, joined by a spline |
 //! | `piecewise` | cubic pieces of a sampled envelope |
-//! | `medium` | [`Medium`]: backscatter and extinction by range |
+//! | `medium` | [`Medium`]: backscatter and extinction by range or height |
+//! | [`aerosol`] | extinction of a visibility; a layer over height |
 //! | [`efficiency`] | [`LayerEfficiency`](efficiency::LayerEfficiency): heterodyne efficiency, one curve or one realisation per pulse |
 //! | `table` | tables over range |
 //! | `line` | [`LineOfSight`]; how thin a layer must be, [`LayerLimits`] |
@@ -57,6 +58,7 @@
 #![warn(clippy::too_many_lines, clippy::type_complexity)]
 
 mod accumulated;
+pub mod aerosol;
 pub mod constants;
 pub mod digitise;
 pub mod efficiency;

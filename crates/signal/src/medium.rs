@@ -6,16 +6,38 @@
 use crate::error::{check_each, check_positive};
 use crate::table::{check_ranges, check_values, locate, value};
 use crate::{Error, LineOfSight};
+use std::sync::Arc;
+
+/// Sine of the elevation of a line that is as good as level: heights change by less than a table
+/// resolves.
+const LEVEL: f64 = 1e-7;
 
 /// Backscatter and extinction along a line of sight, straight lines between the points of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Medium {
+    table: Arc<Table>,
+    path: Path,
+}
+
+/// The points of a medium.
+#[derive(Debug, PartialEq)]
+struct Table {
     range_m: Vec<f64>,
     backscatter_per_m_sr: Vec<f64>,
     extinction_per_m: Vec<f64>,
     /// Optical depth from the lidar to each range of the table.
     depth: Vec<f64>,
-    uniform: bool,
+}
+
+/// How a line of sight goes through the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Path {
+    /// The air is the same everywhere.
+    Uniform,
+    /// The table is over range.
+    Along,
+    /// The table is over height: height of the lidar, m, and sine of the elevation.
+    Slanted { height_m: f64, climb: f64 },
 }
 
 impl Medium {
@@ -40,11 +62,13 @@ impl Medium {
             depth.push(depth[depth.len() - 1] + 0.5 * (alpha[0] + alpha[1]) * (r[1] - r[0]));
         }
         Ok(Self {
-            range_m,
-            backscatter_per_m_sr,
-            extinction_per_m,
-            depth,
-            uniform: false,
+            table: Arc::new(Table {
+                range_m,
+                backscatter_per_m_sr,
+                extinction_per_m,
+                depth,
+            }),
+            path: Path::Along,
         })
     }
 
@@ -59,7 +83,7 @@ impl Medium {
             vec![extinction_per_m],
         )?;
         Ok(Self {
-            uniform: true,
+            path: Path::Uniform,
             ..medium
         })
     }
@@ -67,34 +91,50 @@ impl Medium {
     /// The air of the chapter's Table 2: 1e-7 per m and sr, an extinction of 7e-5 per m.
     pub fn table2() -> Self {
         Self {
-            range_m: vec![0.0],
-            backscatter_per_m_sr: vec![1e-7],
-            extinction_per_m: vec![7e-5],
-            depth: vec![0.0],
-            uniform: true,
+            table: Arc::new(Table {
+                range_m: vec![0.0],
+                backscatter_per_m_sr: vec![1e-7],
+                extinction_per_m: vec![7e-5],
+                depth: vec![0.0],
+            }),
+            path: Path::Uniform,
+        }
+    }
+
+    /// This air with its table over height, along a line of sight from `height_m` with an
+    /// elevation; the points are shared.
+    pub fn along(&self, height_m: f64, elevation_rad: f64) -> Self {
+        let climb = elevation_rad.sin();
+        Self {
+            table: Arc::clone(&self.table),
+            path: Path::Slanted { height_m, climb },
         }
     }
 
     /// Backscatter `beta` \[1/(m sr)\] and one-way optical depth at a range.
     fn at(&self, range_m: f64) -> Result<(f64, f64), Error> {
         check_positive("range_m", range_m)?;
-        if self.uniform || range_m <= self.range_m[0] {
-            return Ok((
-                self.backscatter_per_m_sr[0],
-                range_m * self.extinction_per_m[0],
-            ));
+        match self.path {
+            Path::Uniform => Ok((
+                self.table.backscatter_per_m_sr[0],
+                range_m * self.table.extinction_per_m[0],
+            )),
+            Path::Along => {
+                let (backscatter_per_m_sr, _, depth) = self.table.at(range_m)?;
+                Ok((backscatter_per_m_sr, depth))
+            }
+            Path::Slanted { height_m, climb } => {
+                let (_, first_per_m, first_depth) = self.table.at(height_m)?;
+                let (backscatter_per_m_sr, last_per_m, last_depth) =
+                    self.table.at(height_m + climb * range_m)?;
+                let depth = if climb.abs() < LEVEL {
+                    0.5 * (first_per_m + last_per_m) * range_m
+                } else {
+                    (last_depth - first_depth) / climb
+                };
+                Ok((backscatter_per_m_sr, depth))
+            }
         }
-        let Some((index, fraction)) = locate(&self.range_m, range_m) else {
-            return Err(Error::OutOfRange {
-                field: "range_m",
-                value: range_m,
-                allowed: "within the table of the medium",
-            });
-        };
-        let start = self.extinction_per_m[index];
-        let end = value(&self.extinction_per_m, index, fraction);
-        let depth = self.depth[index] + 0.5 * (start + end) * (range_m - self.range_m[index]);
-        Ok((value(&self.backscatter_per_m_sr, index, fraction), depth))
     }
 
     /// Backscatter `beta` \[1/(m sr)\] at a range.
@@ -136,6 +176,29 @@ impl Medium {
         }
         line.weight_per_m = weight_per_m;
         Ok(())
+    }
+}
+
+impl Table {
+    /// Backscatter, extinction and optical depth at a range of the table.
+    fn at(&self, range_m: f64) -> Result<(f64, f64, f64), Error> {
+        if range_m <= self.range_m[0] {
+            let extinction_per_m = self.extinction_per_m[0];
+            let depth = range_m * extinction_per_m;
+            return Ok((self.backscatter_per_m_sr[0], extinction_per_m, depth));
+        }
+        let Some((index, fraction)) = locate(&self.range_m, range_m) else {
+            return Err(Error::OutOfRange {
+                field: "range_m",
+                value: range_m,
+                allowed: "within the table of the medium",
+            });
+        };
+        let start = self.extinction_per_m[index];
+        let end = value(&self.extinction_per_m, index, fraction);
+        let depth = self.depth[index] + 0.5 * (start + end) * (range_m - self.range_m[index]);
+        let backscatter_per_m_sr = value(&self.backscatter_per_m_sr, index, fraction);
+        Ok((backscatter_per_m_sr, end, depth))
     }
 }
 

@@ -83,6 +83,7 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let (o, known, mut there) = (&plan.scene().outputs, EfficiencyMemo::default(), None);
     let optics = LineOptics {
         plan,
+        instrument: &plan.instrument,
         known: &known,
         observer,
     };

@@ -3,28 +3,27 @@
 //!
 //! Check: a table of ages; before the aircraft the air is at rest.
 
-use super::vortex::VortexPair;
 use super::wind::Wind;
 use crate::error::{Error, check, check_lengths};
 
 /// The wake of an aircraft that flies along +x.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AlongFlight {
-    pair: VortexPair,
+pub struct AlongFlight<W> {
+    pair: W,
     speed_m_s: f64,
     aircraft_x_m: f64,
 }
 
-impl AlongFlight {
-    /// The wake of an aircraft that is at `aircraft_x_m` at time 0.
+impl<W: Wind> AlongFlight<W> {
+    /// The wake of an aircraft that is at `aircraft_x_m` at time 0, of a pair whose time is its age.
     ///
     /// # Errors
-    /// As [`VortexPair::validate`]; [`Error::OutOfRange`] for a speed that is not positive.
-    pub fn new(pair: VortexPair, speed_m_s: f64, aircraft_x_m: f64) -> Result<Self, Error> {
+    /// [`Error::OutOfRange`] for a speed that is not positive.
+    pub fn new(pair: W, speed_m_s: f64, aircraft_x_m: f64) -> Result<Self, Error> {
         check("speed_m_s", speed_m_s, "positive", |v| v > 0.0)?;
         check("aircraft_x_m", aircraft_x_m, "finite", |_| true)?;
         Ok(Self {
-            pair: pair.wind()?,
+            pair,
             speed_m_s,
             aircraft_x_m,
         })
@@ -36,7 +35,7 @@ impl AlongFlight {
     }
 }
 
-impl Wind for AlongFlight {
+impl<W: Wind> Wind for AlongFlight<W> {
     fn velocity_into(
         &self,
         points_m: &[[f64; 3]],

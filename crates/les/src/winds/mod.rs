@@ -6,6 +6,8 @@
 //! | `wind` | the trait [`Wind`]; [`SampledLine`]; [`Sum`] |
 //! | `profile` | circulation against radius of one vortex, (3), (4); the two-scale profile |
 //! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
+//! | `decay` | lifetime and decay laws of a pair |
+//! | `pair_path`, `transported` | [`TransportedPair`]: a pair that decays and moves |
 //! | `along_flight` | the pair, older the farther it is behind the aircraft |
 //! | `linear` | [`Linear`]: uniform, or linear in place and time |
 //! | `mean_wind` | [`MeanWind`]: logarithmic law, power law or table over the height |
@@ -18,13 +20,16 @@
 
 mod along_flight;
 pub(crate) mod axis;
+pub mod decay;
 mod eddies;
 pub(crate) mod grid_wind;
 mod linear;
 mod mean_wind;
+mod pair_path;
 mod profile;
 mod series;
 mod strain;
+mod transported;
 mod volume;
 mod vortex;
 mod wind;
@@ -35,8 +40,10 @@ pub use eddies::{Eddies, LineEvaluation, Mode, ModeBand, isotropic_modes};
 pub use grid_wind::{GridSnapshot, PlaneMesh};
 pub use linear::Linear;
 pub use mean_wind::{MeanWind, VON_KARMAN_CONSTANT, WindLaw};
+pub use pair_path::Transport;
 pub use profile::{CirculationProfile, TwoScale};
 pub use series::Series;
+pub use transported::TransportedPair;
 pub use volume::{VolumeComponent, VolumeSnapshot};
-pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair};
+pub use vortex::{Aircraft, Centres, Ground, Motion, Vortex, VortexPair};
 pub use wind::{SampledLine, Sum, Wind};

@@ -73,6 +73,17 @@ pub struct Centres {
     pub height_m: f64,
 }
 
+/// One vortex at some time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vortex {
+    /// Circulation \[m^2/s\], anticlockwise positive: negative for the vortex at smaller y.
+    pub circulation_m2_s: f64,
+    /// Lateral coordinate of the centre \[m\].
+    pub lateral_position_m: f64,
+    /// Height of the centre \[m\].
+    pub height_m: f64,
+}
+
 impl VortexPair {
     /// Says what is wrong with the pair, if anything.
     ///
@@ -180,17 +191,55 @@ impl VortexPair {
         }
     }
 
-    /// Velocity `(v, w)` of one vortex of circulation `sign * Gamma0`, anticlockwise if positive,
-    /// seen at `(dy, dz)` from its centre.
-    fn vortex_velocity(&self, sign: f64, dy_m: f64, dz_m: f64) -> [f64; 2] {
+    /// The left and the right vortex at `time_s`; as [`VortexPair::centres`].
+    pub fn vortices(&self, time_s: f64) -> [Vortex; 2] {
+        let centres = self.centres(time_s);
+        [(-1.0, centres.left_y_m), (1.0, centres.right_y_m)].map(|(sign, lateral_position_m)| {
+            Vortex {
+                circulation_m2_s: sign * self.circulation_m2_s,
+                lateral_position_m,
+                height_m: centres.height_m,
+            }
+        })
+    }
+
+    /// Velocity `(v, w)` of a vortex with this circulation, anticlockwise if positive, and the
+    /// profile of the pair, at `(dy, dz)` from its centre.
+    fn vortex_velocity(&self, circulation_m2_s: f64, dy_m: f64, dz_m: f64) -> [f64; 2] {
         let square_m2 = dy_m * dy_m + dz_m * dz_m;
-        let omega = sign
-            * self.profile.angular_velocity_rad_s(
-                self.circulation_m2_s,
-                self.core_radius_m,
-                square_m2,
-            );
+        let omega =
+            self.profile
+                .angular_velocity_rad_s(circulation_m2_s, self.core_radius_m, square_m2);
         [-omega * dz_m, omega * dy_m]
+    }
+
+    /// Writes the velocity of some vortices with the core and the ground of the pair.
+    pub(super) fn sum_into(
+        &self,
+        vortices: &[Vortex],
+        points_m: &[[f64; 3]],
+        out_m_s: &mut [[f64; 3]],
+    ) {
+        for (&[_, y_m, z_m], out) in points_m.iter().zip(out_m_s) {
+            let mut sum = [0.0; 2];
+            for vortex in vortices {
+                let circulation_m2_s = vortex.circulation_m2_s;
+                let dy_m = y_m - vortex.lateral_position_m;
+                let mut velocity =
+                    self.vortex_velocity(circulation_m2_s, dy_m, z_m - vortex.height_m);
+                if self.ground == Ground::Image {
+                    // Added to its own vortex first, so that the two vertical velocities cancel to
+                    // the bit at z = 0.
+                    let image =
+                        self.vortex_velocity(-circulation_m2_s, dy_m, z_m + vortex.height_m);
+                    velocity[0] += image[0];
+                    velocity[1] += image[1];
+                }
+                sum[0] += velocity[0];
+                sum[1] += velocity[1];
+            }
+            *out = [0.0, sum[0], sum[1]];
+        }
     }
 
     /// Half distance and height \[m\] of the point vortices over a plane at `time_s`.
@@ -223,25 +272,7 @@ impl Wind for VortexPair {
     ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         check("time_s", time_s, "finite", |_| true)?;
-        let centres = self.centres(time_s);
-        let vortices = [(-1.0, centres.left_y_m), (1.0, centres.right_y_m)];
-        for (&[_, y_m, z_m], out) in points_m.iter().zip(out_m_s) {
-            let mut sum = [0.0; 2];
-            for (sign, centre_y_m) in vortices {
-                let dy_m = y_m - centre_y_m;
-                let mut velocity = self.vortex_velocity(sign, dy_m, z_m - centres.height_m);
-                if self.ground == Ground::Image {
-                    // Added to its own vortex first, so that the two vertical velocities cancel to
-                    // the bit at z = 0.
-                    let image = self.vortex_velocity(-sign, dy_m, z_m + centres.height_m);
-                    velocity[0] += image[0];
-                    velocity[1] += image[1];
-                }
-                sum[0] += velocity[0];
-                sum[1] += velocity[1];
-            }
-            *out = [0.0, sum[0], sum[1]];
-        }
+        self.sum_into(&self.vortices(time_s), points_m, out_m_s);
         Ok(())
     }
 
@@ -249,36 +280,53 @@ impl Wind for VortexPair {
     /// ([`CirculationProfile::max_line_gradient_per_s`]) plus what the others can add where that
     /// one is the nearest. Never too small; 4 % too large for cores of 5 % of the spacing.
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
-        let centres = self.centres(time_s);
-        let spacing_m = centres.right_y_m - centres.left_y_m;
-        let others_m = match self.ground {
-            Ground::None => vec![spacing_m],
-            Ground::Image => {
-                let image_m = 2.0 * centres.height_m;
-                vec![spacing_m, image_m, spacing_m.hypot(image_m)]
-            }
-        };
-        let own = self
-            .profile
-            .max_line_gradient_per_s(self.circulation_m2_s, self.core_radius_m);
+        let [left, right] = self.vortices(time_s);
+        gradient_about_per_s(self, &left, &[right])
+    }
+}
+
+/// The largest line gradient of vortices with the core and the ground of a pair: the largest of
+/// those where each one is the nearest.
+pub(super) fn largest_gradient_per_s(pair: &VortexPair, vortices: &[Vortex]) -> f64 {
+    let mut largest_per_s = 0.0_f64;
+    for (i, own) in vortices.iter().enumerate() {
+        let mut others = vortices.to_vec();
+        others.remove(i);
+        largest_per_s = largest_per_s.max(gradient_about_per_s(pair, own, &others));
+    }
+    largest_per_s
+}
+
+/// Upper bound of the line gradient where one vortex is the nearest: its own strain and what
+/// others and the images can add there.
+fn gradient_about_per_s(pair: &VortexPair, own: &Vortex, others: &[Vortex]) -> f64 {
+    let core_m = pair.core_radius_m;
+    let strain_per_s = |vortex: &Vortex, distance_m: f64| {
+        let circulation_m2_s = vortex.circulation_m2_s.abs();
         // A point is nearest to one vortex, so each other one is at least half their distance away;
         // beyond the peak of the strain, which lies within 1.2 core radii, the strain only falls.
-        let added: f64 = others_m
-            .iter()
-            .map(|&distance_m| {
-                if distance_m > 2.4 * self.core_radius_m {
-                    self.profile.strain_rate_per_s(
-                        self.circulation_m2_s,
-                        self.core_radius_m,
-                        0.5 * distance_m,
-                    )
-                } else {
-                    own
-                }
-            })
-            .sum();
-        own + added
+        if distance_m > 2.4 * core_m {
+            pair.profile
+                .strain_rate_per_s(circulation_m2_s, core_m, 0.5 * distance_m)
+        } else {
+            pair.profile
+                .max_line_gradient_per_s(circulation_m2_s, core_m)
+        }
+    };
+    let apart_m = |other: &Vortex| other.lateral_position_m - own.lateral_position_m;
+    let mut added_per_s = 0.0;
+    for other in others {
+        let distance_m = apart_m(other).hypot(other.height_m - own.height_m);
+        added_per_s += strain_per_s(other, distance_m);
     }
+    if pair.ground == Ground::Image {
+        added_per_s += strain_per_s(own, 2.0 * own.height_m);
+        for other in others {
+            let distance_m = apart_m(other).hypot(other.height_m + own.height_m);
+            added_per_s += strain_per_s(other, distance_m);
+        }
+    }
+    strain_per_s(own, 0.0) + added_per_s
 }
 
 /// An aircraft as far as its wake is concerned, equation (5): `M g = rho U b0 Gamma0`,

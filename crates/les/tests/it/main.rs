@@ -13,6 +13,7 @@ mod references;
 mod scan_winds;
 #[cfg(feature = "solver")]
 mod stored_cases;
+mod transport;
 mod vortex;
 #[cfg(feature = "solver")]
 mod wake_reference;

@@ -77,8 +77,12 @@ fn pair(motion: Motion) -> VortexPair {
 fn the_wake_is_as_old_as_the_table_says_and_absent_before_the_aircraft() {
     each("age_along_flight", |row| {
         let wake = pair(Motion::Inviscid);
-        let wind =
-            AlongFlight::new(wake, row("aircraft_speed_m_s"), row("aircraft_x_at_t0_m")).unwrap();
+        let wind = AlongFlight::new(
+            wake.wind().unwrap(),
+            row("aircraft_speed_m_s"),
+            row("aircraft_x_at_t0_m"),
+        )
+        .unwrap();
         let (x_m, time_s) = (row("x_m"), row("time_s"));
         assert!((wind.age_s(x_m, time_s) - row("age_s")).abs() < 1e-9);
         let point = [x_m, 424.0, 45.0];

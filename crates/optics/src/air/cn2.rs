@@ -202,18 +202,48 @@ impl Cn2Path {
     }
 }
 
+/// Cn2 \[m^(-2/3)\] of the Hufnagel-Valley model at a height: `0.00594 (w/27)^2 (1e-5 z)^10
+/// exp(-z/1000) + 2.7e-16 exp(-z/1500) + A exp(-z/100)` with the high wind `w` \[m/s\] and the
+/// strength `A` at the ground; 21 and 1.7e-14 make it the model 5/7 (Andrews and Phillips 2005).
+pub fn hufnagel_valley_m_m23(height_m: f64, high_wind_m_s: f64, ground_m_m23: f64) -> f64 {
+    let wind = high_wind_m_s / 27.0;
+    let high = 0.00594 * wind * wind * (1e-5 * height_m).powi(10) * (-height_m / 1000.0).exp();
+    high + 2.7e-16 * (-height_m / 1500.0).exp() + ground_m_m23 * (-height_m / 100.0).exp()
+}
+
+/// Points of a law in each decade of height: the coherence radius is within 0.1 %.
+const POINTS_PER_DECADE: u32 = 40;
+/// Least height above 0 of a law, m, and its decades.
+const LOWEST_M: f64 = 0.1;
+const DECADES: u32 = 9;
+
+impl Cn2Path {
+    /// A law of Cn2 \[m^(-2/3)\] over height along a slanted line, in straight pieces between 40
+    /// heights a decade.
+    pub fn from_law(law: impl Fn(f64) -> f64, telescope_height_m: f64, elevation_rad: f64) -> Self {
+        let mut height_m = vec![0.0];
+        for i in 0..=DECADES * POINTS_PER_DECADE {
+            let decades = f64::from(i) / f64::from(POINTS_PER_DECADE);
+            height_m.push(LOWEST_M * 10f64.powf(decades));
+        }
+        let cn2_m_m23 = height_m.iter().map(|h| law(*h)).collect();
+        Self::Heights {
+            height_m,
+            cn2_m_m23,
+            telescope_height_m,
+            elevation_rad,
+        }
+    }
+}
+
 /// Hufnagel-Valley 5/7 up to `top_m`, with knots dense near the ground.
 #[cfg(test)]
 pub(crate) fn hufnagel_valley(top_m: f64, telescope_height_m: f64, elevation_rad: f64) -> Cn2Path {
     let height_m: Vec<f64> = (0..=2000)
         .map(|i| top_m * (f64::from(i) / 2000.0).powi(2))
         .collect();
-    let at = |h: f64| {
-        0.00594 * (21f64 / 27.0).powi(2) * (1e-5 * h).powi(10) * (-h / 1000.0).exp()
-            + 2.7e-16 * (-h / 1500.0).exp()
-            + 1.7e-14 * (-h / 100.0).exp()
-    };
-    let cn2_m_m23 = height_m.iter().map(|&h| at(h)).collect();
+    let at = |h: &f64| hufnagel_valley_m_m23(*h, 21.0, 1.7e-14);
+    let cn2_m_m23 = height_m.iter().map(at).collect();
     Cn2Path::Heights {
         height_m,
         cn2_m_m23,
@@ -282,6 +312,55 @@ mod tests {
                 .map(|&(z, w)| w * f(z))
                 .sum();
             assert!((found / sum(&f) - 1.0).abs() < 1e-6, "{power}");
+        }
+    }
+
+    fn rows(text: &str) -> Vec<Vec<f64>> {
+        let lines = text.lines().filter(|line| !line.starts_with('#')).skip(1);
+        lines
+            .map(|line| {
+                let cells = line.split(',').filter_map(|cell| cell.parse().ok());
+                cells.collect()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn hufnagel_valley_and_its_path_integrals_are_those_of_the_tables() {
+        let law = |height_m: f64| hufnagel_valley_m_m23(height_m, 21.0, 1.7e-14);
+        for row in rows(include_str!("../../../../tests/reference/air/cn2.csv")) {
+            assert!((law(row[0]) / row[1] - 1.0).abs() < 1e-8, "{row:?}");
+        }
+        let wavelength_m = 1.55e-6;
+        let k = std::f64::consts::TAU / wavelength_m;
+        for row in rows(include_str!(
+            "../../../../tests/reference/air/cn2_paths.csv"
+        )) {
+            let [range_m, elevation_rad, height_m, integral, radius_m, rytov] = row[..] else {
+                panic!("{row:?}")
+            };
+            let dense = hufnagel_valley(8000.0, height_m, elevation_rad);
+            let sampled = Cn2Path::from_law(law, height_m, elevation_rad);
+            for (path, band) in [(dense, 1e-4), (sampled, 2e-3)] {
+                let near = |found: f64, expected: f64| {
+                    assert!(
+                        (found / expected - 1.0).abs() < band,
+                        "{found:e} {expected:e}"
+                    );
+                };
+                near(path.mean(0.0, range_m).unwrap() * range_m, integral);
+                let radius = crate::air::coherence_radius_m(&path, wavelength_m, range_m);
+                near(radius.unwrap(), radius_m);
+                // Of a spherical wave, both ends weigh nothing.
+                let mut variance = 0.0;
+                for piece in path.edges_m(0.0, range_m).windows(2) {
+                    for (z, dz) in GaussLegendre::new(9).mapped(piece[0], piece[1]) {
+                        let weight = (z * (range_m - z) / range_m).powf(5.0 / 6.0);
+                        variance += path.at(z).unwrap() * weight * dz;
+                    }
+                }
+                near(2.25 * k.powf(7.0 / 6.0) * variance, rytov);
+            }
         }
     }
 }

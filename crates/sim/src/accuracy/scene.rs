@@ -189,6 +189,7 @@ impl<'a> Study<'a> {
         let begun = Instant::now();
         let optics = LineOptics {
             plan: &plan,
+            instrument: &plan.instrument,
             known: &self.common.efficiencies,
             observer: self.observer,
         };

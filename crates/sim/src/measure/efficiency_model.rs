@@ -12,9 +12,7 @@ use wakescope_optics::plan::{Model, cheapest_model};
 pub(crate) fn model(scene: &Scene) -> Model {
     let cn2 = match scene.refractive_turbulence() {
         None => Cn2Path::None,
-        Some(t) => Cn2Path::Uniform {
-            cn2_m_m23: t.cn2_m_m23,
-        },
+        Some(t) => t.cn2_along(0.0, 0.0),
     };
     cheapest_model(scene.telescope.receiver, &cn2)
 }

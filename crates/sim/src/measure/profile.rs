@@ -13,7 +13,7 @@ use crate::memo::Memo;
 use crate::plan::instrument::Instrument;
 use crate::plan::{Plan, PlannedStage, Stage, Target};
 use crate::progress::Observer;
-use crate::scene::{ReceiverPath, Scene, SnrReference, hash_of};
+use crate::scene::{ReceiverPath, SnrReference, hash_of};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wakescope_optics::air::StructureTable;
@@ -169,6 +169,8 @@ fn refuse_fresnel_numbers(telescope: &Telescope, ranges_m: &[f64]) -> Result<(),
 #[derive(Clone, Copy)]
 pub(crate) struct LineOptics<'a> {
     pub(crate) plan: &'a Plan,
+    /// The instrument with the air of the line.
+    pub(crate) instrument: &'a Instrument,
     pub(crate) known: &'a EfficiencyMemo,
     pub(crate) observer: &'a dyn Observer,
 }
@@ -180,7 +182,7 @@ impl LineOptics<'_> {
     /// What the optics refuse, such as a grid too small for the beam; in turbulence that phase screens cross, ranges beyond the signals and
     /// the profile of the scene.
     pub(crate) fn profile_at(&self, range_m: &[f64]) -> Result<RangeProfile, Error> {
-        let (scene, instrument) = (self.plan.scene(), &self.plan.instrument);
+        let (scene, instrument) = (self.plan.scene(), self.instrument);
         let theory = efficiency_by_theory(instrument, range_m)?;
         let (mut others, mut lost_power_fraction) = (Vec::new(), None);
         let mut efficiency = theory.clone();
@@ -215,7 +217,7 @@ impl LineOptics<'_> {
     /// # Errors
     /// As [`Self::profile_at`].
     pub(crate) fn efficiency_at(&self, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
-        let theory = efficiency_by_theory(&self.plan.instrument, range_m)?;
+        let theory = efficiency_by_theory(self.instrument, range_m)?;
         match model(self.plan.scene()) {
             Model::MonteCarlo => Ok(self.across_screens(&theory)?.0[0].clone()),
             _ => Ok(theory),
@@ -225,14 +227,12 @@ impl LineOptics<'_> {
     /// The efficiency at the layers of the lines, as [`Self::efficiency_at`].
     pub(crate) fn of_layers(&self) -> Result<Arc<EfficiencyProfile>, Error> {
         let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
-        self.known
-            .layers
-            .get_or_make(cause(self.plan.scene(), &ranges_m), || {
-                self.observer.begin(Stage::Efficiency, 1);
-                let profile = self.efficiency_at(&ranges_m)?;
-                self.observer.end();
-                Ok(profile)
-            })
+        self.known.layers.get_or_make(self.cause(&ranges_m), || {
+            self.observer.begin(Stage::Efficiency, 1);
+            let profile = self.efficiency_at(&ranges_m)?;
+            self.observer.end();
+            Ok(profile)
+        })
     }
 
     /// The phase screens of a stretch of range, m.
@@ -240,9 +240,7 @@ impl LineOptics<'_> {
         let range_m = curved_ranges_m(&self.plan.instrument.telescope, from_m, to_m, OF_SCREENS);
         self.known
             .screens
-            .get_or_make(cause(self.plan.scene(), &range_m), || {
-                self.run_screens(range_m)
-            })
+            .get_or_make(self.cause(&range_m), || self.run_screens(range_m))
     }
 
     /// The monostatic and the bistatic efficiency across phase screens at the ranges of `theory`, and the light lost at the border: the
@@ -286,13 +284,24 @@ impl LineOptics<'_> {
         Ok(([profile([a, b, c]), profile([d, e, f])], lost))
     }
 
+    /// What a curve depends on: on the seed only in turbulence, where screens may be drawn.
+    fn cause(&self, range_m: &[f64]) -> String {
+        let scene = self.plan.scene();
+        let (air, laser) = (&scene.atmosphere.turbulence, scene.laser.wavelength_m);
+        let seed = scene.refractive_turbulence().map(|_| scene.seed);
+        let cn2 = self.instrument.turbulence.as_ref().map(|t| &t.cn2);
+        hash_of(&format!(
+            "{:?}",
+            (laser, &scene.telescope, air, cn2, seed, range_m)
+        ))
+    }
+
     /// Runs the screens of some ranges, m, increasing.
     ///
     /// # Errors
     /// What the optics refuse, such as a grid too small for the beam.
     fn run_screens(&self, range_m: Vec<f64>) -> Result<Screens, Error> {
-        let (scene, instrument, observer) =
-            (self.plan.scene(), &self.plan.instrument, self.observer);
+        let (scene, instrument, observer) = (self.plan.scene(), self.instrument, self.observer);
         let t = scene.refractive_turbulence().unwrap_or_default();
         observer.begin(Stage::PhaseScreens, t.realisations as u64);
         let mut seen = 0;
@@ -444,16 +453,6 @@ pub(crate) struct Screens {
     lost_power_fraction: f64,
 }
 
-/// What a curve depends on: on the seed only in turbulence, where screens may be drawn.
-fn cause(scene: &Scene, range_m: &[f64]) -> String {
-    let (air, laser) = (&scene.atmosphere.turbulence, scene.laser.wavelength_m);
-    let seed = scene.refractive_turbulence().map(|_| scene.seed);
-    hash_of(&format!(
-        "{:?}",
-        (laser, &scene.telescope, air, seed, range_m)
-    ))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -477,6 +476,7 @@ mod tests {
     fn optics<'a>(plan: &'a Plan, known: &'a EfficiencyMemo) -> LineOptics<'a> {
         LineOptics {
             plan,
+            instrument: &plan.instrument,
             known,
             observer: &Silent,
         }

@@ -43,12 +43,12 @@ pub(crate) fn records_at_once<T>(samples: usize, pulses: usize) -> usize {
 pub struct Scanner<'a> {
     plan: &'a Plan,
     simulator: Simulator,
-    /// Return per metre of each layer.
-    weight_per_m: Vec<f64>,
+    /// Return per metre of each layer, for each air of the plan.
+    weights_per_m: Vec<Vec<f64>>,
     /// The air of the first realisation, which all have unless each has its own turbulence.
     pub air: ScanAir,
-    /// The efficiency of each pulse over the mean, where pulses have their own.
-    efficiency: Option<LayerEfficiency>,
+    /// The efficiency of each pulse over the mean, where pulses have their own, for each turbulence of the plan.
+    efficiency: Option<Vec<LayerEfficiency>>,
 }
 
 /// The air along the lines of sight of a realisation.
@@ -68,7 +68,7 @@ impl ScanAir {
     fn new(
         plan: &Plan,
         wind: Arc<SceneWind>,
-        weight_per_m: &[f64],
+        weights_per_m: &[Vec<f64>],
         observer: &dyn Observer,
     ) -> Result<Self, Error> {
         let geometry = &plan.geometry;
@@ -83,7 +83,8 @@ impl ScanAir {
         let airs = in_time_order(&wind, &all, |line| geometry.line_time_s[*line], of_line)?;
         let lines: Vec<LineOfSight> = airs
             .iter()
-            .map(|air| line_of_sight(weight_per_m, air, geometry))
+            .enumerate()
+            .map(|(line, air)| line_of_sight(&weights_per_m[plan.air_of_line(line)], air, geometry))
             .collect();
         let spreads: Option<Vec<&[f64]>> =
             airs.iter().map(|air| air.spread_m_s.as_deref()).collect();
@@ -121,12 +122,13 @@ impl<'a> Scanner<'a> {
         let (scene, instrument, geometry) = (plan.scene(), &plan.instrument, &plan.geometry);
         let optics = LineOptics {
             plan,
+            instrument,
             known,
             observer,
         };
-        let weight_per_m = layer_returns(&optics)?;
+        let weights_per_m = returns_of_airs(&optics)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
-        let air = ScanAir::new(plan, plan.wind.clone(), &weight_per_m, observer)?;
+        let air = ScanAir::new(plan, plan.wind.clone(), &weights_per_m, observer)?;
         observer.end();
         let efficiency = drawn_efficiency(&optics, &air.lines)?;
         let record = Record {
@@ -144,7 +146,7 @@ impl<'a> Scanner<'a> {
         Ok(Self {
             plan,
             simulator,
-            weight_per_m,
+            weights_per_m,
             air,
             efficiency,
         })
@@ -152,7 +154,7 @@ impl<'a> Scanner<'a> {
 
     /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio.
     pub fn layer_snr(&self) -> Vec<(f64, f64)> {
-        let Some(line) = self.air.lines.first() else {
+        let Some(line) = self.air.lines.get(self.plan.reference_line()) else {
             return Vec::new();
         };
         layer_snr(self.plan.scene(), &self.plan.instrument, line)
@@ -168,6 +170,7 @@ impl<'a> Scanner<'a> {
     ) -> Result<Vec<(f64, f64)>, Error> {
         let optics = LineOptics {
             plan,
+            instrument: &plan.instrument,
             known: &EfficiencyMemo::default(),
             observer,
         };
@@ -229,7 +232,7 @@ impl<'a> Scanner<'a> {
             return Ok(None);
         }
         let wind = Arc::new(plan.wind.with_eddies_of(&plan.file, realisation)?);
-        ScanAir::new(plan, wind, &self.weight_per_m, &Silent).map(Some)
+        ScanAir::new(plan, wind, &self.weights_per_m, &Silent).map(Some)
     }
 
     /// The records of some pulses of a realisation.
@@ -254,7 +257,11 @@ impl<'a> Scanner<'a> {
                 if schedule.lines[line].first == pulse {
                     observer.advance(1);
                 }
-                let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
+                let turbulence = self.plan.turbulence_of_line(line);
+                let efficiency = self
+                    .efficiency
+                    .as_ref()
+                    .map(|all| all[turbulence].of_pulse(index(key)));
                 let previous = air.previous.as_ref().map(|lines| &lines[line]);
                 let impairment_seed =
                     stream(self.plan.scene().seed, "asides", index(key) as u64).next_u64();
@@ -282,16 +289,17 @@ impl<'a> Scanner<'a> {
         }
         let schedule = &self.plan.geometry.schedule;
         let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
-        let beams: Vec<Beam> = pulses
+        let beams: Vec<(usize, Beam)> = pulses
             .clone()
-            .map(|pulse| schedule.beam_of_pulse(pulse))
+            .map(|pulse| (schedule.line_of(pulse), schedule.beam_of_pulse(pulse)))
             .collect();
-        let along = |beam: &Beam| {
+        let along = |(line, beam): &(usize, Beam)| {
             let along = wind_along(self.plan, &air.wind, beam, &ranges_m)?;
             let geometry = &self.plan.geometry;
-            Ok(line_of_sight(&self.weight_per_m, &along, geometry))
+            let weight_per_m = &self.weights_per_m[self.plan.air_of_line(*line)];
+            Ok(line_of_sight(weight_per_m, &along, geometry))
         };
-        in_time_order(&air.wind, &beams, |beam| beam.time_s, along)
+        in_time_order(&air.wind, &beams, |(_, beam)| beam.time_s, along)
     }
 }
 
@@ -350,11 +358,25 @@ fn line_of_sight(weight_per_m: &[f64], air: &LineWind, geometry: &Geometry) -> L
     }
 }
 
+/// [`layer_returns`] of each air of the plan.
+fn returns_of_airs(optics: &LineOptics<'_>) -> Result<Vec<Vec<f64>>, Error> {
+    let instruments = optics.plan.instruments();
+    instruments
+        .iter()
+        .map(|instrument| {
+            layer_returns(&LineOptics {
+                instrument,
+                ..*optics
+            })
+        })
+        .collect()
+}
+
 /// Return per metre of each layer, K^2 beta A_R eta_s/R^2, (9), with the mean efficiency; a signal-to-noise ratio that the scene
 /// states takes the place of all of it.
 fn layer_returns(optics: &LineOptics<'_>) -> Result<Vec<f64>, Error> {
     let plan = optics.plan;
-    let (scene, instrument, geometry) = (plan.scene(), &plan.instrument, &plan.geometry);
+    let (scene, instrument, geometry) = (plan.scene(), optics.instrument, &plan.geometry);
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         let unit = instrument
             .receiver
@@ -376,7 +398,7 @@ fn previous_air(
     wind: &SceneWind,
     lines: &[LineOfSight],
 ) -> Result<Option<Vec<LineOfSight>>, Error> {
-    let (scene, instrument, geometry) = (plan.scene(), &plan.instrument, &plan.geometry);
+    let (scene, geometry) = (plan.scene(), &plan.geometry);
     let Some(SecondTrip {
         radial_velocity_m_s: elsewhere_m_s,
     }) = scene.scan.second_trip
@@ -388,13 +410,15 @@ fn previous_air(
         .layer_range_m()
         .map(|range_m| range_m + apart_m)
         .collect();
-    let efficiency = efficiency_by_theory(instrument, &ranges_m)?;
-    let weight = |(&range_m, eta): (&f64, &f64)| Ok(instrument.return_per_m(range_m)? * eta);
-    let weight_per_m = ranges_m
-        .iter()
-        .zip(&efficiency.mean)
-        .map(weight)
-        .collect::<Result<Vec<_>, Error>>()?;
+    let mut weights_per_m = Vec::new();
+    for instrument in plan.instruments() {
+        let efficiency = efficiency_by_theory(instrument, &ranges_m)?;
+        let mut weight_per_m = Vec::with_capacity(ranges_m.len());
+        for (range_m, eta) in ranges_m.iter().zip(&efficiency.mean) {
+            weight_per_m.push(instrument.return_per_m(*range_m)? * eta);
+        }
+        weights_per_m.push(weight_per_m);
+    }
     let far = |(i, line): (usize, &LineOfSight)| {
         let mut velocity_m_s = known_velocity_m_s(wind, &geometry.schedule.middle(i), &ranges_m)?.1;
         velocity_m_s
@@ -403,7 +427,7 @@ fn previous_air(
             .for_each(|v| *v = elsewhere_m_s);
         Ok(LineOfSight {
             radial_velocity_m_s: velocity_m_s,
-            weight_per_m: weight_per_m.clone(),
+            weight_per_m: weights_per_m[plan.air_of_line(i)].clone(),
             ..line.clone()
         })
     };
@@ -416,11 +440,12 @@ fn previous_air(
     ))
 }
 
-/// EfficiencyMemo of the layers over their mean, one set for each realisation of the turbulence, if the pulses have their own.
+/// Efficiency of the layers over their mean, one set for each realisation of the turbulence, if the pulses have their own; for each
+/// turbulence of the plan.
 fn drawn_efficiency(
     optics: &LineOptics<'_>,
     lines: &[LineOfSight],
-) -> Result<Option<LayerEfficiency>, Error> {
+) -> Result<Option<Vec<LayerEfficiency>>, Error> {
     let (scene, geometry) = (optics.plan.scene(), &optics.plan.geometry);
     let (Some(_), Some(line)) = (drawn_turbulence(scene), lines.first()) else {
         return Ok(None);
@@ -429,10 +454,15 @@ fn drawn_efficiency(
     let Some(&(ends_m, _)) = stretches(scene, geometry, &first_m).first() else {
         return Ok(None);
     };
-    let screens = optics.screens(ends_m)?;
-    Ok(Some(LayerEfficiency::new(
-        &screens.range_m,
-        &screens.realisations,
-        line,
-    )?))
+    let mut all = Vec::new();
+    for instrument in optics.plan.turbulences() {
+        let optics = LineOptics {
+            instrument,
+            ..*optics
+        };
+        let screens = optics.screens(ends_m)?;
+        let of_layers = LayerEfficiency::new(&screens.range_m, &screens.realisations, line)?;
+        all.push(of_layers);
+    }
+    Ok(Some(all))
 }

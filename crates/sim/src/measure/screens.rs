@@ -4,6 +4,7 @@
 use crate::Error;
 use crate::measure::efficiency_model::{OF_SCREENS, model, signals_cross_screens, stretches};
 use crate::measure::profile::{EfficiencyMemo, layer_ranges_m, table_ranges_m};
+use crate::plan::instrument::Instrument;
 use crate::plan::{Plan, PlannedStage, Stage};
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling};
 use std::sync::Arc;
@@ -33,13 +34,23 @@ pub(crate) fn planned(
             _ => "not asked for",
         });
     }
-    let key = format!("{:?}", (plan.instrument.telescope, t, &ranges_m));
-    let screens = memo.screen_plans.get_or_make(key, || {
-        let runs: Vec<&[f64]> = ranges_m.iter().map(Vec::as_slice).collect();
-        let plans = plan.instrument.screen_plans(&t, &runs);
-        plans.map_err(|error| refused(&plan.file, &t, error))
-    })?;
+    let of_air = |instrument: &Instrument| {
+        let cn2 = instrument.turbulence.as_ref().map(|t| &t.cn2);
+        let key = format!("{:?}", (instrument.telescope, &t, cn2, &ranges_m));
+        memo.screen_plans.get_or_make(key, || {
+            let runs: Vec<&[f64]> = ranges_m.iter().map(Vec::as_slice).collect();
+            let plans = instrument.screen_plans(&t, &runs);
+            plans.map_err(|error| refused(&plan.file, &t, error))
+        })
+    };
+    let screens = of_air(&plan.instrument)?;
     let mut core_s = 0.0;
+    // Those of other elevations, where Cn2 changes with height.
+    for instrument in &plan.turbulences()[1..] {
+        for screens in of_air(instrument)?.iter() {
+            core_s += screens.realisation_cpu_s * t.realisations as f64;
+        }
+    }
     let mut working_bytes = 0.0_f64;
     let mut descriptions = Vec::new();
     for (range_m, screens) in ranges_m.iter().zip(screens.iter()) {

@@ -48,7 +48,7 @@ impl Instrument {
         };
         let turbulence = scene
             .refractive_turbulence()
-            .map(|t| t.simulated())
+            .map(|t| t.along(scene.scan.lidar_height_m, 0.0))
             .transpose()?;
         Ok(Self {
             telescope,
@@ -56,7 +56,7 @@ impl Instrument {
             receiver,
             digitiser,
             turbulence,
-            air: scene.atmosphere.medium()?,
+            air: scene.atmosphere.medium(scene.laser.wavelength_m)?,
             transmission: 10f64.powf(-0.1 * scene.telescope.optics_loss_db),
             blind_range_m: scene.telescope.blind_range_m,
         })

@@ -8,6 +8,7 @@
 //! | module | what is in it |
 //! |---|---|
 //! | [`instrument`], [`estimators`] | a scene in the terms of the other crates |
+//! | `airs` | the air of each line, where it changes with height |
 //! | [`wind`], `line_wind`, `fastest` | the wind: analytic, or the planes of a simulated flow; the wind along beams, its largest velocity |
 //! | [`geometry`], `scan_lines` | lines of sight, samples, gates, layers |
 //! | `described` | pulse and site as files carry them |
@@ -15,6 +16,7 @@
 //! | `schedule`, `warnings` | duration and revisit time of the scan; what the user should know |
 
 use crate::Error;
+use crate::plan::airs::Airs;
 use crate::plan::counts::Counts;
 use crate::plan::geometry::Geometry;
 use crate::plan::instrument::Instrument;
@@ -25,6 +27,7 @@ use std::fmt;
 use std::sync::Arc;
 use wakescope_optics::plan::Plan as ScreenPlan;
 
+pub(crate) mod airs;
 pub(crate) mod counts;
 pub(crate) mod described;
 pub mod estimators;
@@ -52,6 +55,8 @@ pub struct Plan {
     pub target: Target,
     /// The instrument and its air.
     pub instrument: Instrument,
+    /// The air of each line, where it changes with height; that of [`Self::instrument`] is of the line in the middle.
+    pub(crate) airs: Airs,
     /// Sampling in angle, range and time.
     pub geometry: Geometry,
     /// The wind.
@@ -88,13 +93,18 @@ impl Plan {
         target: Target,
         wind: Arc<SceneWind>,
     ) -> Result<Self, Error> {
-        let instrument = Instrument::new(&file.content)?;
+        let mut instrument = Instrument::new(&file.content)?;
         let geometry = Geometry::new(&file, &instrument.pulse, &wind)?;
+        let airs = Airs::new(&file.content, &instrument, &geometry.schedule)?;
+        if let Some(of_middle_line) = airs.of_middle_line() {
+            instrument = of_middle_line.clone();
+        }
         let counts = Counts::new(&file.content, target, &geometry);
         let mut plan = Self {
             file,
             target,
             instrument,
+            airs,
             geometry,
             wind,
             stages: Vec::new(),
@@ -118,6 +128,17 @@ impl Plan {
         }
         let (key, what) = match self.scene().flow {
             Flow::Fields(_) => ("flow.files", "fields"),
+            Flow::VortexPair(_) => {
+                let age_tau = self.wind.tau;
+                let reason = format!(
+                    "flow.motion = \"transported\" gives the pair a path of {end_s:.0} s, the scan ends at {last_s:.0} s: a smaller age \
+                     than {age_tau} tau, or a faster scan"
+                );
+                return Err(Error::Key {
+                    key: "flow.age_tau",
+                    reason,
+                });
+            }
             _ => ("flow.planes", "planes"),
         };
         let reason = format!(
@@ -135,6 +156,15 @@ impl Plan {
     /// Time of the last line from the start of the flow, s.
     pub fn scan_end_s(&self) -> f64 {
         self.wind.start_s + self.geometry.line_time_s.last().copied().unwrap_or(0.0)
+    }
+
+    /// Age of the wake at the end of the scan, s; behind an aircraft that in the plane of the lidar.
+    pub(crate) fn oldest_age_s(&self) -> f64 {
+        let scene = self.scene();
+        let aircraft = scene.flow.pair().and_then(|pair| pair.aircraft);
+        let x_m = scene.scan.lidar.x_m;
+        let since_s = aircraft.map_or(0.0, |a| (a.x_m - x_m) / a.speed_m_s);
+        (self.scan_end_s() + since_s).max(0.0)
     }
 
     /// Computing time on one core, s, to a factor of two; at least that of small files.
@@ -225,6 +255,10 @@ impl fmt::Display for Plan {
         )?;
         if self.target != Target::Efficiency {
             writeln!(f, "  scan  {}", self.schedule())?;
+        }
+        let pair = self.wind.pair.as_ref();
+        if let Some(text) = pair.and_then(|pair| pair.description(self.oldest_age_s())) {
+            writeln!(f, "  wake  {text}")?;
         }
         for w in &self.warnings {
             writeln!(f, "  warning: {w}")?;

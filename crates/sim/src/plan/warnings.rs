@@ -40,6 +40,10 @@ pub(super) fn of_scene(plan: &Plan) -> Result<Vec<String>, Error> {
     out.extend(of_ambiguous_ranges(plan));
     out.extend(of_frozen_eddies(plan));
     out.extend(of_low_profiles(plan));
+    out.extend(of_low_profile(plan));
+    if let Some(pair) = &plan.wind.pair {
+        out.extend(pair.warnings(plan.oldest_age_s()));
+    }
     let (first_m, blind_m) = (scene.scan.range_min_m, scene.telescope.blind_range_m);
     if first_m < blind_m {
         out.push(format!("scan.range_min_m = {first_m}: nothing is seen up to telescope.blind_range_m, {blind_m} m"));
@@ -75,6 +79,21 @@ fn of_frozen_eddies(plan: &Plan) -> Option<String> {
         format!(
             "the eddies are frozen for {scan_s:.0} s, longer than outer_scale_m over their standard deviation, {lifetime_s:.0} s, after \
              which those of real air have changed: decorrelation = \"sweeping\" changes them"
+        )
+    })
+}
+
+/// A table of Cn2 that ends below the scan.
+fn of_low_profile(plan: &Plan) -> Option<String> {
+    let scene = plan.scene();
+    let end_m = scene.refractive_turbulence()?.profile?.end_m()?;
+    let schedule = &plan.geometry.schedule;
+    let top_m = (0..schedule.lines.len())
+        .map(|line| schedule.middle(line).at_range_m(scene.scan.range_max_m)[2])
+        .fold(0.0, f64::max);
+    (end_m < top_m).then(|| {
+        format!(
+            "atmosphere.turbulence.profile ends at {end_m} m, the scan at {top_m:.0} m: Cn2 stays as at its last height"
         )
     })
 }

@@ -6,10 +6,14 @@
 
 mod eddies;
 mod fields;
+mod pair;
 mod planes;
 
+pub(crate) use pair::ScenePair;
+pub use pair::{start_s, vortex_pair};
+
 use crate::Error;
-use crate::scene::{CoreProfile, Flow, SceneFile, SimulatedMotion, VortexMotion, VortexPair};
+use crate::scene::{CoreProfile, Flow, SceneFile, SimulatedMotion};
 use std::fmt;
 use std::sync::Arc;
 use wakescope_les::{self as les, Wind};
@@ -34,6 +38,8 @@ pub struct SceneWind {
     pub source: String,
     /// Times of fields that are read when they are needed, s.
     field_times_s: Vec<f64>,
+    /// The analytic pair of `[flow]`, if there is one.
+    pub(crate) pair: Option<ScenePair>,
 }
 
 impl fmt::Debug for SceneWind {
@@ -92,15 +98,31 @@ impl SceneWind {
         match flow {
             Flow::Simulated(flow) => planes::simulated(flow, file),
             Flow::Fields(flow) => fields::fields(flow, file),
-            _ => {
-                let tau = flow.pair().map_or(0.0, |pair| pair.age_tau);
-                let found = Self::of(analytic_wind(flow)?, "the flow is analytic".into());
+            Flow::VortexPair(pair) => {
+                let found = ScenePair::new(pair, file)?;
+                let vortices = found.wind(pair)?;
+                let wind: Box<dyn Wind> = match pair.cross_wind_m_s {
+                    0.0 => vortices,
+                    lateral_m_s => Box::new(les::winds::Sum {
+                        winds: vec![vortices, Box::new(uniform_wind(lateral_m_s, 0.0)?)],
+                    }),
+                };
+                let end_s = match pair.aircraft {
+                    None => found.last_age_s(),
+                    Some(_) => f64::INFINITY,
+                };
                 Ok(Self {
                     start_s: start_s(flow),
-                    tau,
-                    ..found
+                    tau: pair.age_tau,
+                    end_s,
+                    pair: Some(found),
+                    ..Self::of(wind, "the flow is analytic".into())
                 })
             }
+            _ => Ok(Self::of(
+                analytic_wind(flow)?,
+                "the flow is analytic".into(),
+            )),
         }
     }
 
@@ -141,6 +163,7 @@ impl SceneWind {
             max_speed_m_s: 0.0,
             source,
             field_times_s: Vec::new(),
+            pair: None,
         }
     }
 
@@ -237,25 +260,23 @@ impl<T: Fn(f64) -> f64 + Send + Sync> Wind for Retimed<T> {
     }
 }
 
-/// A flow that is analytic, and calm air for another.
+/// A flow that is analytic and no pair, and calm air for another.
 ///
 /// # Errors
 /// What the wind refuses; a checked scene gives none.
 fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
     Ok(match flow {
         // Turbulence is added to the sum of all other flows.
-        Flow::Calm {} | Flow::Eddies(_) | Flow::Simulated(_) | Flow::Fields(_) => {
-            Box::<les::winds::Sum>::default()
-        }
+        Flow::Calm {}
+        | Flow::Eddies(_)
+        | Flow::VortexPair(_)
+        | Flow::Simulated(_)
+        | Flow::Fields(_) => Box::<les::winds::Sum>::default(),
         Flow::Wind(wind) => Box::new(wind.simulated()?),
         Flow::Uniform {
             lateral_m_s,
             vertical_m_s,
-        } => Box::new(les::winds::Linear::uniform([
-            0.0,
-            *lateral_m_s,
-            *vertical_m_s,
-        ])?),
+        } => Box::new(uniform_wind(*lateral_m_s, *vertical_m_s)?),
         Flow::Linear(wind) => {
             let linear = les::winds::Linear {
                 velocity_m_s: wind.velocity_m_s,
@@ -268,45 +289,16 @@ fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
             };
             Box::new(linear.validated()?)
         }
-        Flow::VortexPair(pair) => {
-            let vortices: Box<dyn Wind> = match pair.aircraft {
-                Some(a) => Box::new(les::winds::AlongFlight::new(
-                    vortex_pair(pair),
-                    a.speed_m_s,
-                    a.x_m,
-                )?),
-                None => Box::new(vortex_pair(pair).wind()?),
-            };
-            if pair.cross_wind_m_s == 0.0 {
-                return Ok(vortices);
-            }
-            let cross = Box::new(les::winds::Linear::uniform([
-                0.0,
-                pair.cross_wind_m_s,
-                0.0,
-            ])?);
-            Box::new(les::winds::Sum {
-                winds: vec![vortices, cross],
-            })
-        }
     })
 }
 
-/// The vortex pair of a scene.
-pub fn vortex_pair(pair: &VortexPair) -> les::VortexPair {
-    les::VortexPair {
-        circulation_m2_s: pair.circulation_m2_s,
-        spacing_m: pair.spacing_m,
-        core_radius_m: pair.core_radius_m,
-        lateral_position_m: pair.lateral_position_m,
-        height_m: pair.height_m,
-        ground: les::Ground::Image,
-        profile: circulation_profile(pair.profile),
-        motion: match pair.motion {
-            VortexMotion::Frozen => les::Motion::Frozen,
-            VortexMotion::Inviscid => les::Motion::Inviscid,
-        },
-    }
+/// The same wind everywhere.
+fn uniform_wind(lateral_m_s: f64, vertical_m_s: f64) -> Result<les::winds::Linear, Error> {
+    Ok(les::winds::Linear::uniform([
+        0.0,
+        lateral_m_s,
+        vertical_m_s,
+    ])?)
 }
 
 /// The circulation profile of a scene or a flow case.
@@ -314,15 +306,5 @@ pub(crate) fn circulation_profile(profile: CoreProfile) -> les::CirculationProfi
     match profile {
         CoreProfile::Algebraic => les::CirculationProfile::Algebraic,
         CoreProfile::LambOseen => les::CirculationProfile::LambOseen,
-    }
-}
-
-/// Age of an analytic flow when the scan begins, s.
-pub fn start_s(flow: &Flow) -> f64 {
-    match flow.pair() {
-        Some(pair) if pair.age_tau > 0.0 && pair.circulation_m2_s > 0.0 => {
-            vortex_pair(pair).time_s(pair.age_tau)
-        }
-        _ => 0.0,
     }
 }

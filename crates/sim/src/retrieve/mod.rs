@@ -20,7 +20,7 @@ pub(crate) mod realisations;
 pub(crate) mod stage;
 pub(crate) mod summary;
 mod table;
-mod truth;
+pub(crate) mod truth;
 
 pub use envelope::{envelope_table, envelopes};
 pub use one_scan::{gate_of, gate_of_instrument, options, retrieve_map, scene_in_file, scene_of};

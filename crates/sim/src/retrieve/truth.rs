@@ -6,7 +6,7 @@
 
 use crate::Error;
 use crate::plan::Plan;
-use crate::plan::wind::vortex_pair;
+use crate::plan::wind::ScenePair;
 use crate::scene::{Flow, VortexPair};
 use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::{Side, VortexResult};
@@ -84,31 +84,48 @@ fn of_pair(
     pair: &VortexPair,
     side: Side,
 ) -> Result<VortexResult, Error> {
-    let air = vortex_pair(pair);
     // Behind an aircraft, the wake in the plane of the scan has its age there.
     let x_m = plan.scene().scan.lidar.x_m;
     let since_s = pair
         .aircraft
         .map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
     let passage = when_passed(plan, lines, |time_s| {
-        let centres = air.centres(time_s + since_s);
-        let y_m = match side {
-            Side::Left => centres.left_y_m,
-            Side::Right => centres.right_y_m,
-        };
-        Ok((y_m, centres.height_m))
+        let vortex = vortex_of(plan.wind.pair.as_ref(), side, time_s + since_s)?;
+        Ok((vortex.lateral_position_m, vortex.height_m))
     })?;
-    if pair.aircraft.is_some() && passage.1 + since_s < 0.0 {
+    let age_s = passage.1 + since_s;
+    if pair.aircraft.is_some() && age_s < 0.0 {
         return Ok(absent(side, passage.1));
     }
-    let mean_m2_s = pair.circulation_m2_s * pair.profile.mean_5_15(pair.core_radius_m).0;
-    let circulations_m2_s = [pair.circulation_m2_s, mean_m2_s];
+    let vortex = vortex_of(plan.wind.pair.as_ref(), side, age_s)?;
+    let circulation_m2_s = vortex.circulation_m2_s.abs();
+    let mean_m2_s = circulation_m2_s * pair.profile.mean_5_15(pair.core_radius_m).0;
     Ok(exact(
         side,
         passage,
-        circulations_m2_s,
+        [circulation_m2_s, mean_m2_s],
         Some(pair.core_radius_m),
     ))
+}
+
+/// A vortex of the analytic pair at an age, s; nowhere in a plan without one.
+fn vortex_of(
+    pair: Option<&ScenePair>,
+    side: Side,
+    age_s: f64,
+) -> Result<wakescope_les::winds::Vortex, Error> {
+    let Some(pair) = pair else {
+        return Ok(wakescope_les::winds::Vortex {
+            circulation_m2_s: 0.0,
+            lateral_position_m: f64::NAN,
+            height_m: f64::NAN,
+        });
+    };
+    let [left, right] = pair.vortices(age_s)?;
+    Ok(match side {
+        Side::Left => left,
+        Side::Right => right,
+    })
 }
 
 /// Both vortices as a wake; nothing in a simulated flow.
@@ -278,6 +295,7 @@ fn centroid(
 mod tests {
     use super::*;
     use crate::plan::Target;
+    use crate::plan::wind::vortex_pair;
     use crate::scene::{Scene, SceneFile, SnrReference, VortexMotion};
 
     fn plan(change: impl FnOnce(&mut crate::scene::VortexPair)) -> Plan {

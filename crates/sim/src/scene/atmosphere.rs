@@ -1,5 +1,6 @@
 //! Aerosol and refractive turbulence of a scene.
 
+use super::{Aerosol, Cn2Profile};
 use crate::keys::{ABOVE_ZERO_OR_INF, keys};
 use std::sync::Arc;
 use wakescope_optics as optics;
@@ -14,6 +15,8 @@ keys! {
         extinction_per_m: f64 = 7e-5 => 0.0..=1.0,
         /// Aerosol as a function of range, in place of the two values above.
         profile: Option<AirProfile> = None,
+        /// Aerosol from a visibility or over height, in place of the first two values.
+        aerosol: Option<Aerosol> = None,
         /// Refractive turbulence.
         turbulence: Turbulence = Turbulence::None {},
     }
@@ -37,7 +40,6 @@ keys! {
     }
 
     /// Refractive turbulence along the beam.
-    #[derive(Copy)]
     kinds Turbulence by "kind" {
         /// None: the free-space efficiency by quadrature, no phase screens.
         "none" => None {},
@@ -46,10 +48,11 @@ keys! {
     }
 
     /// Turbulence of constant strength along the path, and its Monte Carlo sampling.
-    #[derive(Copy)]
     table RefractiveTurbulence {
         /// Structure constant Cn2, m^(-2/3).
         cn2_m_m23: f64 = 1e-15 => 0.0..=1e-9,
+        /// Cn2 over height, in place of cn2_m_m23.
+        profile: Option<Cn2Profile> = None,
         /// Shape of the spectrum.
         spectrum: SpectrumKind = SpectrumKind::VonKarman,
         /// Inner scale l0, m; 0 for none.
@@ -92,19 +95,42 @@ keys! {
 impl super::Scene {
     /// The refractive turbulence, if there is any.
     pub(crate) fn refractive_turbulence(&self) -> Option<RefractiveTurbulence> {
-        match self.atmosphere.turbulence {
-            Turbulence::Refractive(t) if t.cn2_m_m23 > 0.0 => Some(t),
+        match &self.atmosphere.turbulence {
+            Turbulence::Refractive(t) if t.cn2_m_m23 > 0.0 || t.profile.is_some() => {
+                Some(t.clone())
+            }
             _ => None,
         }
+    }
+
+    /// Whether the air of a line of sight depends on its elevation.
+    pub(crate) fn has_layered_air(&self) -> bool {
+        let turbulence = self.refractive_turbulence();
+        let has_cn2_profile = turbulence.is_some_and(|t| t.profile.is_some());
+        has_cn2_profile || self.atmosphere.has_layered_aerosol()
     }
 }
 
 impl RefractiveTurbulence {
-    /// The turbulence that the optics propagate through.
+    /// Cn2 along a line of sight from a height, m, with an elevation, rad.
+    pub(crate) fn cn2_along(&self, height_m: f64, elevation_rad: f64) -> optics::Cn2Path {
+        match &self.profile {
+            Some(profile) => profile.along(height_m, elevation_rad),
+            None => optics::Cn2Path::Uniform {
+                cn2_m_m23: self.cn2_m_m23,
+            },
+        }
+    }
+
+    /// The turbulence that the optics propagate through along a line of sight from a height, m, with an elevation, rad.
     ///
     /// # Errors
     /// Fails if the optics refuse its strength or its scales.
-    pub(crate) fn simulated(&self) -> Result<optics::Turbulence, optics::Error> {
+    pub(crate) fn along(
+        &self,
+        height_m: f64,
+        elevation_rad: f64,
+    ) -> Result<optics::Turbulence, optics::Error> {
         let scales = optics::air::Scales {
             outer_scale_m: self.outer_scale_m,
             inner_scale_m: self.inner_scale_m,
@@ -117,9 +143,7 @@ impl RefractiveTurbulence {
             SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
             SpectrumKind::HillAndrews => Arc::new(optics::air::HillAndrews::new(scales)?),
         };
-        let cn2 = optics::Cn2Path::Uniform {
-            cn2_m_m23: self.cn2_m_m23,
-        };
+        let cn2 = self.cn2_along(height_m, elevation_rad);
         Ok(optics::Turbulence {
             spectrum,
             cn2: cn2.validated()?,
@@ -128,11 +152,19 @@ impl RefractiveTurbulence {
 }
 
 impl Atmosphere {
-    /// The air that the signal simulation looks through.
+    /// Whether the aerosol changes with height.
+    pub(crate) fn has_layered_aerosol(&self) -> bool {
+        self.aerosol.is_some_and(|aerosol| aerosol.is_layered())
+    }
+
+    /// The air that the signal simulation looks through at a wavelength; one with layers is over height.
     ///
     /// # Errors
     /// Fails if the ranges of a profile do not increase or a value is no coefficient.
-    pub(crate) fn medium(&self) -> Result<Medium, wakescope_signal::Error> {
+    pub(crate) fn medium(&self, wavelength_m: f64) -> Result<Medium, wakescope_signal::Error> {
+        if let Some(aerosol) = &self.aerosol {
+            return aerosol.medium(wavelength_m);
+        }
         let Some(profile) = &self.profile else {
             return Medium::uniform(self.backscatter_per_m_sr, self.extinction_per_m);
         };
@@ -168,7 +200,7 @@ mod tests {
             profile: Some(profile),
             ..Atmosphere::default()
         }
-        .medium()
+        .medium(1.55e-6)
         .unwrap();
         for range_m in [1e4, 3e7, 1.5e11] {
             let (found, expected) = (air.transmission(range_m).unwrap(), (-1e-9 * range_m).exp());

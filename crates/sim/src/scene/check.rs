@@ -28,6 +28,7 @@ impl Scene {
             check_flow(flow, &at, &mut c);
         }
         self.check_air(&mut c);
+        self.check_carriers(&mut c);
         self.check_head(&mut c);
         check_estimator(self, &mut c);
         check_retrieval(self, &mut c);
@@ -48,7 +49,7 @@ impl Scene {
     }
 
     fn check_instrument(&self, c: &mut Checker<'_>) {
-        if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
+        if let Turbulence::Refractive(t) = &self.atmosphere.turbulence {
             let is_needed = !matches!(self.detector.snr, SnrReference::Fixed { .. });
             c.require(
                 is_needed || t.efficiency == EfficiencyOfPulse::Mean,
@@ -62,7 +63,12 @@ impl Scene {
 
     /// What the libraries refuse of the tables that are passed to them as they are.
     fn check_by_libraries(&self, c: &mut Checker<'_>) {
-        if let (Some(profile), Err(error)) = (&self.atmosphere.profile, self.atmosphere.medium())
+        let air = &self.atmosphere;
+        if let (Some(profile), Some(_)) = (&air.profile, &air.aerosol) {
+            let allowed = "absent beside atmosphere.aerosol, which takes its place";
+            c.require(false, "atmosphere.profile", profile.range_m.len(), allowed);
+        } else if let (Some(profile), Err(error)) =
+            (&air.profile, air.medium(self.laser.wavelength_m))
             && !c.has_problem_of("atmosphere.profile")
         {
             refuse(c, "atmosphere.profile", profile, error.into());
@@ -82,9 +88,13 @@ impl Scene {
                 "atmosphere.turbulence.outer_scale_m",
                 "atmosphere.turbulence.inner_scale_m",
             ];
+            let profile = t.profile.as_ref();
+            if profile.is_some_and(|p| !p.check("atmosphere.turbulence.profile", c)) {
+                return;
+            }
             // Limits between keys make sense only once each key does.
             if c.compare(keys, [t.outer_scale_m, t.inner_scale_m], "above")
-                && let Err(error) = t.simulated()
+                && let Err(error) = t.along(0.0, 0.0)
             {
                 refuse(c, table, turbulence, error.into());
             }

@@ -2,7 +2,7 @@
 //! Check: each limit is broken once.
 
 use super::air::{EddyField, WindProfile, check_eddies, check_wind_profile};
-use crate::keys::{Checker, Named, keys};
+use crate::keys::{ABOVE_ZERO, Checker, Named, keys};
 use std::f64::consts::TAU;
 use wakescope_estimate::vortex_fit::CoreProfile;
 
@@ -51,10 +51,39 @@ keys! {
         motion: VortexMotion = VortexMotion::Frozen,
         /// Age of the pair when the scan begins, in tau = t V0/b0; not 0 only if it moves.
         age_tau: f64 = 0.0 => 0.0..=1e3,
-        /// Uniform cross wind added to the pair, m/s, positive away from the lidar.
+        /// Uniform cross wind added to the pair, m/s, positive away from the lidar; it carries a transported pair alone.
         cross_wind_m_s: f64 = 0.0 => -1e3..=1e3,
+        /// How the circulation of a transported pair decays.
+        decay: PairDecay as omitted = PairDecay::default(),
+        /// Lifetime T of a transported pair, in tau; that of its turbulence and stability if absent.
+        lifetime_tau: Option<f64> = None => ABOVE_ZERO,
+        /// Eddy dissipation rate that ends a transported pair, m^2/s^3; that of `"eddies"`, or 0, if absent.
+        dissipation_m2_s3: Option<f64> = None => 0.0..=10.0,
+        /// Brunt-Vaisala frequency of the air, which slows the descent of a transported pair, 1/s.
+        buoyancy_per_s: f64 as omitted = 0.0 => 0.0..=0.1,
+        /// Whether secondary vortices of the ground let a transported pair rebound.
+        rebound: bool as omitted = false,
         /// The aircraft, if the wake is the older the farther it is behind it; absent: of one age everywhere.
         aircraft: Option<Aircraft> = None,
+    }
+
+    /// How the circulation of a transported pair decays with its age tau and lifetime T.
+    #[derive(Copy)]
+    kinds PairDecay by "law" {
+        /// exp(-slow tau - fast max(0, tau - T)).
+        "two_phase" => TwoPhase {
+            /// Rate before the lifetime is over, per tau.
+            slow: f64 = 0.06 => 0.0..=10.0,
+            /// Rate that is added after it, per tau.
+            fast: f64 = 0.4 => 0.0..=100.0,
+        },
+        /// exp(-rate tau/T).
+        "sarpkaya" => Sarpkaya {
+            /// Decay over one lifetime.
+            rate: f64 = 0.45 => 0.0..=100.0,
+        },
+        /// Refused: no readable source has the constants of the model P2P.
+        "p2p" => P2p {},
     }
 
     /// An aircraft that flies along +x.
@@ -128,6 +157,8 @@ keys! {
         Frozen = "frozen",
         /// It follows the inviscid hyperbola over the ground, also during the scan.
         Inviscid = "inviscid",
+        /// It decays, descends, may rebound, and drifts with the wind.
+        Transported = "transported",
     }
 
     /// Cross-planes of a simulated flow.
@@ -236,9 +267,10 @@ pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
         }
         Flow::VortexPair(p) => {
             let key = key("age_tau");
-            let allowed = "0 for a pair at rest; an age needs flow.motion = \"inviscid\"";
+            let allowed =
+                "0 for a pair at rest; an age needs flow.motion = \"inviscid\" or \"transported\"";
             c.require(
-                p.age_tau == 0.0 || p.motion == VortexMotion::Inviscid,
+                p.age_tau == 0.0 || p.motion != VortexMotion::Frozen,
                 &key,
                 p.age_tau,
                 allowed,
@@ -251,11 +283,96 @@ pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
                 p.age_tau,
                 allowed,
             );
+            p.check_transport(at, c);
+        }
+    }
+}
+
+impl Default for PairDecay {
+    fn default() -> Self {
+        Self::TwoPhase {
+            slow: 0.06,
+            fast: 0.4,
+        }
+    }
+}
+
+impl VortexPair {
+    /// Whether the pair decays and moves with the wind.
+    pub(crate) fn is_transported(&self) -> bool {
+        self.motion == VortexMotion::Transported
+    }
+
+    /// The limits of the keys of a transported pair.
+    fn check_transport(&self, at: &str, c: &mut Checker<'_>) {
+        let key = |name: &str| format!("{at}.{name}");
+        if !self.is_transported() {
+            let stated = [
+                ("decay", self.decay != PairDecay::default()),
+                ("lifetime_tau", self.lifetime_tau.is_some()),
+                ("dissipation_m2_s3", self.dissipation_m2_s3.is_some()),
+                ("buoyancy_per_s", self.buoyancy_per_s != 0.0),
+                ("rebound", self.rebound),
+            ];
+            for (name, is_stated) in stated {
+                let allowed = format!("absent without {at}.motion = \"transported\"");
+                c.require(!is_stated, &key(name), "stated", allowed);
+            }
+            return;
+        }
+        let allowed = "\"two_phase\" or \"sarpkaya\": no readable source has the constants of P2P";
+        let is_known = self.decay != PairDecay::P2p {};
+        c.require(is_known, &key("decay.law"), "p2p", allowed);
+        let allowed = "above 0: a transported pair moves by its circulation";
+        c.require(
+            self.circulation_m2_s > 0.0,
+            &key("circulation_m2_s"),
+            self.circulation_m2_s,
+            allowed,
+        );
+        if let (Some(_), Some(dissipation)) = (self.lifetime_tau, self.dissipation_m2_s3) {
+            let allowed = format!("absent beside {at}.lifetime_tau, which it would set");
+            c.require(false, &key("dissipation_m2_s3"), dissipation, allowed);
         }
     }
 }
 
 impl super::Scene {
+    /// The uniform winds that carry transported pairs. One that changes along the path, and a second one, are refused.
+    pub(super) fn check_carriers(&self, c: &mut Checker<'_>) {
+        let is_transported = |flow: &Flow| flow.pair().is_some_and(VortexPair::is_transported);
+        if !self.flows().any(|(_, flow)| is_transported(flow)) {
+            return;
+        }
+        let mut first: Option<String> = None;
+        for (at, flow) in self.flows() {
+            let (key, value) = match flow {
+                Flow::Linear(_) => {
+                    let allowed = "no \"linear\" wind beside a transported pair: a \"uniform\" one carries it";
+                    c.require(false, &format!("{at}.kind"), "linear", allowed);
+                    continue;
+                }
+                Flow::Uniform { lateral_m_s, .. } if *lateral_m_s != 0.0 => {
+                    ("lateral_m_s", format!("{lateral_m_s:?}"))
+                }
+                Flow::VortexPair(pair) if pair.cross_wind_m_s != 0.0 => {
+                    ("cross_wind_m_s", format!("{:?}", pair.cross_wind_m_s))
+                }
+                Flow::Wind(_) => ("kind", "\"wind\"".to_owned()),
+                _ => continue,
+            };
+            let key = format!("{at}.{key}");
+            match &first {
+                None => first = Some(key),
+                Some(first) => {
+                    let allowed =
+                        format!("0 beside {first}: one cross wind carries a transported pair");
+                    c.refuse(&key, &value, allowed);
+                }
+            }
+        }
+    }
+
     /// Whether the air is at rest everywhere.
     pub(crate) fn is_calm(&self) -> bool {
         let is_none =

@@ -51,6 +51,11 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
         &air,
         "atmosphere.profile takes its place".into(),
     );
+    unused(
+        scene.atmosphere.aerosol.is_some(),
+        &air,
+        "atmosphere.aerosol takes its place".into(),
+    );
     let losses = ["telescope.optics_loss_db", "telescope.blind_range_m"];
     let fixed = matches!(scene.detector.snr, SnrReference::Fixed { .. });
     unused(
@@ -121,6 +126,11 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
             "atmosphere.turbulence.inner_scale_m",
             "atmosphere.turbulence.outer_scale_m",
         ];
+        unused(
+            turbulence.profile.is_some(),
+            &["atmosphere.turbulence.cn2_m_m23"],
+            "atmosphere.turbulence.profile takes its place".into(),
+        );
         let derived = turbulence.sampling == ScreenSampling::Derived;
         unused(
             derived,

@@ -6,7 +6,6 @@
 use crate::measure::response::SceneResponse;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
-use crate::plan::wind::vortex_pair;
 use crate::scene::{Flow, VortexPair};
 use ndarray::{Array2, s};
 use wakescope_estimate::map::ErrorStatistics;
@@ -15,11 +14,14 @@ use wakescope_estimate::vortex_fit::{
     FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex,
     Wake, WakeModel, fit_map_of_estimator,
 };
+use wakescope_les::winds::Vortex as TrueVortex;
 
 /// What fits and bound need of a case whose flow is a pair.
 pub(crate) struct Retrieval<'p> {
     plan: &'p Plan,
     pair: VortexPair,
+    /// The vortices in the middle of the scan.
+    vortices: [TrueVortex; 2],
     response: SceneResponse,
     circulations_m2_s: Vec<f64>,
 }
@@ -37,12 +39,15 @@ impl<'p> Retrieval<'p> {
         if !is_one_scan || pair.circulation_m2_s <= 0.0 || pair.aircraft.is_some() {
             return None;
         }
+        let time_s = 0.5 * (plan.wind.start_s + plan.scan_end_s());
+        let vortices = plan.wind.pair.as_ref()?.vortices(time_s).ok()?;
         let response = SceneResponse::new(plan, scanner.layer_snr())
             .ok()
             .flatten()?;
         Some(Self {
             plan,
             pair,
+            vortices,
             response,
             circulations_m2_s: Vec::new(),
         })
@@ -99,13 +104,10 @@ impl<'p> Retrieval<'p> {
     fn bound_m2_s(&self) -> Result<f64, crate::Error> {
         let scene = self.plan.scene();
         let g = &self.plan.geometry;
-        let time_s = 0.5 * (self.plan.wind.start_s + self.plan.scan_end_s());
-        let centres = vortex_pair(&self.pair).centres(time_s);
-        let lateral_positions_m = [centres.left_y_m, centres.right_y_m];
-        let [left, right] = lateral_positions_m.map(|lateral_position_m| Vortex {
-            circulation_m2_s: self.pair.circulation_m2_s,
-            lateral_position_m,
-            height_m: centres.height_m,
+        let [left, right] = self.vortices.map(|vortex| Vortex {
+            circulation_m2_s: vortex.circulation_m2_s.abs(),
+            lateral_position_m: vortex.lateral_position_m,
+            height_m: vortex.height_m,
             core_radius_m: self.pair.core_radius_m,
         });
         let truth = Wake {
@@ -128,10 +130,12 @@ impl<'p> Retrieval<'p> {
     /// Mean error of the fits and root mean square, m^2/s, each with its standard error; the part of the fits that did not come to an
     /// end; the bound, m^2/s. NaN with all others but the bound where no fit was tried.
     pub(super) fn result(&self) -> [f64; 6] {
+        let [left, right] = self.vortices.map(|vortex| vortex.circulation_m2_s.abs());
+        let truth_m2_s = 0.5 * (left + right);
         let errors = ErrorStatistics::of(
             self.circulations_m2_s
                 .iter()
-                .map(|found| found - self.pair.circulation_m2_s),
+                .map(|found| found - truth_m2_s),
         );
         let [bias, rms] = [
             [errors.bias_m_s, errors.bias_standard_error_m_s],

@@ -12,11 +12,11 @@ use crate::measure::profile::EfficiencyMemo;
 use crate::measure::ray_information::range_filter;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
-use crate::plan::wind::vortex_pair;
 use crate::progress::Observer;
 use crate::run::ScanMiddle;
 use crate::scene::{Flow, NoiseModel};
 use ndarray::Array2;
+use wakescope_les::winds::Vortex;
 
 /// Cells within this part of the spacing of a pair from a centre are inside its vortices: 8 m of 47.
 const INSIDE_PART: f64 = 8.0 / 47.0;
@@ -97,6 +97,12 @@ impl<'p> Collected<'p> {
     fn new(plan: &'p Plan, retrieval: Option<Retrieval<'p>>) -> Result<Self, Error> {
         let scene = plan.scene();
         let g = &plan.geometry;
+        let mut centres = Vec::new();
+        if let Some(pair) = &plan.wind.pair {
+            for time_s in &g.line_time_s {
+                centres.push(pair.vortices(plan.wind.start_s + time_s)?);
+            }
+        }
         let distance =
             Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
                 let elevation_rad = g.elevation_rad[i];
@@ -105,12 +111,12 @@ impl<'p> Collected<'p> {
                 let z_m = scene.scan.lidar_height_m + range_m * elevation_rad.sin();
                 match &scene.flow {
                     Flow::VortexPair(pair) => {
-                        let centres =
-                            vortex_pair(pair).centres(plan.wind.start_s + g.line_time_s[i]);
-                        let below_m = z_m - centres.height_m;
-                        let left_m = (y_m - centres.left_y_m).hypot(below_m);
-                        let right_m = (y_m - centres.right_y_m).hypot(below_m);
-                        left_m.min(right_m) / pair.spacing_m
+                        let vortices = &centres[i];
+                        let distance_m = |vortex: &Vortex| {
+                            let below_m = z_m - vortex.height_m;
+                            (y_m - vortex.lateral_position_m).hypot(below_m)
+                        };
+                        distance_m(&vortices[0]).min(distance_m(&vortices[1])) / pair.spacing_m
                     }
                     Flow::Simulated(_) | Flow::Fields(_) => f64::NAN,
                     Flow::Calm {}

@@ -9,6 +9,7 @@ use crate::measure::profile::RangeProfile;
 use crate::plan::Plan;
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 use crate::scene::SnrReference;
+use wakescope_les::winds::Vortex;
 use wakescope_optics::EfficiencyProfile;
 
 /// Signal-to-noise ratio and efficiency against range, each with its standard error as a band.
@@ -337,9 +338,8 @@ fn title(plan: &Plan, has_gaps: bool) -> String {
 
 /// Centres of the vortices that the picture marks, where they are known.
 fn centres_m(plan: &Plan) -> Vec<(f64, f64)> {
-    let Some(pair) = plan.scene().flow.pair() else {
-        return Vec::new();
-    };
-    let c = crate::plan::wind::vortex_pair(pair).centres(plan.wind.start_s);
-    vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
+    let pair = plan.wind.pair.as_ref();
+    let vortices = pair.and_then(|pair| pair.vortices(plan.wind.start_s).ok());
+    let centre = |vortex: &Vortex| (vortex.lateral_position_m, vortex.height_m);
+    vortices.iter().flatten().map(centre).collect()
 }

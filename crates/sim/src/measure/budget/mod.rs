@@ -66,6 +66,7 @@ impl Budget {
     pub fn new(plan: &Plan, range_m: &[f64], observer: &dyn Observer) -> Result<Self, Error> {
         let optics = LineOptics {
             plan,
+            instrument: &plan.instrument,
             known: &EfficiencyMemo::default(),
             observer,
         };
@@ -302,10 +303,12 @@ impl<'a> Rows<'a> {
             decibels(0.5 * crate::SPEED_OF_LIGHT_M_S),
         );
         let profile = || "profile".to_owned();
-        let (air, beta) = (
-            scene.atmosphere.profile.as_ref(),
-            scene.atmosphere.backscatter_per_m_sr,
-        );
+        let atmosphere = &scene.atmosphere;
+        let is_profile = atmosphere.profile.is_some() || atmosphere.aerosol.is_some();
+        let coefficient = |value: f64, unit: &str| match is_profile {
+            true => profile(),
+            false => format!("{} {unit}", scientific(value)),
+        };
         let backscatter = self.at_each(&|r| {
             let clear = Instrument {
                 blind_range_m: 0.0,
@@ -314,7 +317,7 @@ impl<'a> Rows<'a> {
             };
             Ok(clear.return_per_m(r)? / (instrument.air.transmission(r)?.powi(2) * solid_angle(r)))
         })?;
-        let value = air.map_or_else(|| format!("{} /(m sr)", scientific(beta)), |_| profile());
+        let value = coefficient(atmosphere.backscatter_per_m_sr, "/(m sr)");
         self.push("backscatter", "beta", value, backscatter);
         let value = format!(
             "A_R/R^2, aperture {}",
@@ -326,10 +329,7 @@ impl<'a> Rows<'a> {
             value,
             self.at_each(&|r| Ok(solid_angle(r)))?,
         );
-        let value = air.map_or_else(
-            || format!("{} /m", scientific(scene.atmosphere.extinction_per_m)),
-            |_| profile(),
-        );
+        let value = coefficient(atmosphere.extinction_per_m, "/m");
         self.push(
             "air, out and back",
             "K^2",
@@ -347,7 +347,10 @@ impl<'a> Rows<'a> {
         let antenna = self.at_each(&|r| Ok(empty.interpolated(r)? / passed.powi(2)))?;
         self.push("antenna efficiency", "eta_a", "free space".into(), antenna);
         if let Some(air) = scene.refractive_turbulence() {
-            let value = format!("Cn2 {} m^(-2/3)", scientific(air.cn2_m_m23));
+            let value = match &air.profile {
+                Some(_) => profile(),
+                None => format!("Cn2 {} m^(-2/3)", scientific(air.cn2_m_m23)),
+            };
             let left =
                 self.at_each(&|r| Ok(efficiency.interpolated(r)? / empty.interpolated(r)?))?;
             self.push("turbulence", "eta_s/eta_s(0)", value, left);
