@@ -256,10 +256,10 @@ impl Integration<'_> {
     fn give_birth(&mut self) {
         // Vortices at one height may differ in the last bits.
         let low_enough = BIRTH_HEIGHT + 1e-9;
-        for side in 0..2 {
+        for (side, outward) in OUTWARD.into_iter().enumerate() {
             if self.is_unborn(side) && self.state[2 * side + 1] <= low_enough {
                 self.birth_tau[side] = self.tau;
-                let lateral = self.state[2 * side] + OUTWARD[side] * BIRTH_FARTHER_OUT;
+                let lateral = self.state[2 * side] + outward * BIRTH_FARTHER_OUT;
                 self.state[4 + 2 * side] = lateral;
                 self.state[5 + 2 * side] = BIRTH_OWN_HEIGHT;
             }
