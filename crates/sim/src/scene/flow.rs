@@ -308,15 +308,33 @@ impl VortexPair {
         let key = |name: &str| format!("{at}.{name}");
         if !self.is_transported() {
             let stated = [
-                ("decay", self.decay != PairDecay::default()),
-                ("lifetime_tau", self.lifetime_tau.is_some()),
-                ("dissipation_m2_s3", self.dissipation_m2_s3.is_some()),
-                ("buoyancy_per_s", self.buoyancy_per_s != 0.0),
-                ("rebound", self.rebound),
+                (
+                    "decay",
+                    self.decay != PairDecay::default(),
+                    format!("{:?}", self.decay.name()),
+                ),
+                (
+                    "lifetime_tau",
+                    self.lifetime_tau.is_some(),
+                    format!("{:?}", self.lifetime_tau.unwrap_or_default()),
+                ),
+                (
+                    "dissipation_m2_s3",
+                    self.dissipation_m2_s3.is_some(),
+                    format!("{:?}", self.dissipation_m2_s3.unwrap_or_default()),
+                ),
+                (
+                    "buoyancy_per_s",
+                    self.buoyancy_per_s != 0.0,
+                    format!("{:?}", self.buoyancy_per_s),
+                ),
+                ("rebound", self.rebound, format!("{:?}", self.rebound)),
             ];
-            for (name, is_stated) in stated {
-                let allowed = format!("absent without {at}.motion = \"transported\"");
-                c.require(!is_stated, &key(name), "stated", allowed);
+            for (name, is_stated, value) in stated {
+                if is_stated {
+                    let allowed = format!("absent without {at}.motion = \"transported\"");
+                    c.refuse(&key(name), &value, allowed);
+                }
             }
             return;
         }
@@ -344,6 +362,7 @@ impl super::Scene {
         if !self.flows().any(|(_, flow)| is_transported(flow)) {
             return;
         }
+        let has_mean_wind = self.mean_winds().next().is_some();
         let mut first: Option<String> = None;
         for (at, flow) in self.flows() {
             let (key, value) = match flow {
@@ -355,7 +374,8 @@ impl super::Scene {
                 Flow::Uniform { lateral_m_s, .. } if *lateral_m_s != 0.0 => {
                     ("lateral_m_s", format!("{lateral_m_s:?}"))
                 }
-                Flow::VortexPair(pair) if pair.cross_wind_m_s != 0.0 => {
+                // Beside a mean wind it is refused for any pair.
+                Flow::VortexPair(pair) if pair.cross_wind_m_s != 0.0 && !has_mean_wind => {
                     ("cross_wind_m_s", format!("{:?}", pair.cross_wind_m_s))
                 }
                 Flow::Wind(_) => ("kind", "\"wind\"".to_owned()),
@@ -365,8 +385,13 @@ impl super::Scene {
             match &first {
                 None => first = Some(key),
                 Some(first) => {
+                    let none = if key.ends_with(".kind") {
+                        "absent"
+                    } else {
+                        "0"
+                    };
                     let allowed =
-                        format!("0 beside {first}: one cross wind carries a transported pair");
+                        format!("{none} beside {first}: one cross wind carries a transported pair");
                     c.refuse(&key, &value, allowed);
                 }
             }
