@@ -94,17 +94,14 @@ impl Wind<'_> {
         };
         let (above_m, z0_m) = (z_m - top_m, self.or("reference_height_m", 10.0) - top_m);
         let at = shape(above_m.max(linear_m)) * (above_m / linear_m).clamp(0.0, 1.0);
-        let (mut u, mut v) = match (self.f("head_wind_m_s"), self.f("cross_wind_m_s")) {
-            (head, cross) if head.is_nan() && cross.is_nan() => {
-                let toward = self.or("toward_rad", 0.5 * PI);
-                let speed = self.or("speed_m_s", 5.0);
-                (speed * toward.cos(), speed * toward.sin())
-            }
-            _ => (
-                -self.or("head_wind_m_s", 0.0),
-                self.or("cross_wind_m_s", 0.0),
-            ),
-        };
+        // Draws state both components or none; the pair of the default scene has a cross wind.
+        let head_wind_m_s = self.f("head_wind_m_s");
+        let (mut u, mut v) = (-head_wind_m_s, self.f("cross_wind_m_s"));
+        if head_wind_m_s.is_nan() {
+            let toward = self.or("toward_rad", 0.5 * PI);
+            let speed = self.or("speed_m_s", 5.0);
+            (u, v) = (speed * toward.cos(), speed * toward.sin());
+        }
         let mut over = at / shape(z0_m);
         if self.f("friction_velocity_m_s").is_finite() {
             let toward = self.or("toward_rad", 0.5 * PI);
