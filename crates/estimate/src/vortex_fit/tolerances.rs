@@ -56,5 +56,5 @@ pub(crate) const HOPELESS_OF_ESTIMATES: f64 = 20.0;
 /// An alternative with a chi-square that is larger by more has no weight (e^-15), nor has what lies beyond it.
 pub(crate) const NEGLIGIBLE: f64 = 30.0;
 
-/// A vortex whose circulation is less than so many of its deviations may be none.
+/// Least ratio of a circulation to its standard error at which a vortex is certain.
 pub(crate) const CERTAIN_SIGMAS: f64 = 3.0;

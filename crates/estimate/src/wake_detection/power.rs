@@ -38,7 +38,7 @@ impl WakeDetector {
             .collect()
     }
 
-    /// One pair of unit circulation in the scan; nothing if none is found in so many tries.
+    /// One pair of unit circulation in the scan; `None` if no trial finds one.
     fn draw_wake<R: Rng>(&self, generator: &mut R) -> Option<Wake> {
         for _ in 0..TRIES.0 {
             let spacing_m = uniform(generator, self.spacing_m);

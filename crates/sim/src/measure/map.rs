@@ -38,7 +38,7 @@ pub struct VelocityEstimates {
     pub v_pulse_m_s: Array2<f64>,
     /// The same weighted with pulse and window.
     pub v_gate_m_s: Array2<f64>,
-    /// Standard deviation of `v_pulse_m_s` over the pulses of a line, m/s, where they have airs of their own: it widens spectra.
+    /// Standard deviation of `v_pulse_m_s` over the pulses of a line, m/s, where they have winds of their own: it widens spectra.
     pub v_spread_m_s: Option<Array2<f64>>,
     /// Estimate of the first realisation, m/s; NaN where there is no true velocity, as in the mean.
     pub v_scan_m_s: Array2<f64>,

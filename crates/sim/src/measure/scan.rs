@@ -54,10 +54,10 @@ pub struct Scanner<'a> {
 /// The air along the lines of sight of a realisation.
 pub struct ScanAir {
     pub(crate) wind: Arc<SceneWind>,
-    /// The air of each line, in the order of the geometry's elevations: that of its middle, or the mean of the airs of its pulses.
+    /// The air of each line, in the order of the geometry's elevations: that of its middle, or the mean of the winds of its pulses.
     pub lines: Vec<LineOfSight>,
     /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the pulses
-    /// have airs of their own.
+    /// have winds of their own.
     pub spread_m_s: Option<Array2<f64>>,
     /// The air that the pulse before lights meanwhile, if the scene asks for its echo.
     previous: Option<Vec<LineOfSight>>,
@@ -80,14 +80,16 @@ impl ScanAir {
             observer.advance(1);
             Ok(air)
         };
-        let airs = in_time_order(&wind, &all, |line| geometry.line_time_s[*line], of_line)?;
-        let lines: Vec<LineOfSight> = airs
+        let winds = in_time_order(&wind, &all, |line| geometry.line_time_s[*line], of_line)?;
+        let lines: Vec<LineOfSight> = winds
             .iter()
             .enumerate()
             .map(|(line, air)| line_of_sight(&weights_per_m[plan.air_of_line(line)], air, geometry))
             .collect();
-        let spreads: Option<Vec<&[f64]>> =
-            airs.iter().map(|air| air.spread_m_s.as_deref()).collect();
+        let spreads: Option<Vec<&[f64]>> = winds
+            .iter()
+            .map(|wind| wind.spread_m_s.as_deref())
+            .collect();
         let shape = (lines.len(), geometry.gate_range_m.len());
         let spread_m_s =
             spreads.and_then(|values| Array2::from_shape_vec(shape, values.concat()).ok());
@@ -126,7 +128,7 @@ impl<'a> Scanner<'a> {
             known,
             observer,
         };
-        let weights_per_m = returns_of_airs(&optics)?;
+        let weights_per_m = returns_of_slants(&optics)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
         let air = ScanAir::new(plan, plan.wind.clone(), &weights_per_m, observer)?;
         observer.end();
@@ -245,7 +247,7 @@ impl<'a> Scanner<'a> {
     ) -> Result<(Array2<T>, Clipped), Error> {
         let schedule = &self.plan.geometry.schedule;
         let index = |key: PulseKey| realisation * self.pulses() + pulses.start + key.pulse;
-        let airs = self.airs_of_pulses(air, &pulses)?;
+        let lines = self.lines_of_pulses(air, &pulses)?;
         let scan = Scan {
             simulator: &self.simulator,
             // One line after the other, which the simulation of signals need not know.
@@ -266,7 +268,7 @@ impl<'a> Scanner<'a> {
                 let impairment_seed =
                     stream(self.plan.scene().seed, "asides", index(key) as u64).next_u64();
                 Shot {
-                    line: airs.get(key.pulse).unwrap_or(&air.lines[line]),
+                    line: lines.get(key.pulse).unwrap_or(&air.lines[line]),
                     efficiency,
                     previous,
                     impairment_seed,
@@ -279,7 +281,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// The air that each of some pulses meets; none where the pulses of a line share one.
-    fn airs_of_pulses(
+    fn lines_of_pulses(
         &self,
         air: &ScanAir,
         pulses: &Range<usize>,
@@ -359,7 +361,7 @@ fn line_of_sight(weight_per_m: &[f64], air: &LineWind, geometry: &Geometry) -> L
 }
 
 /// [`layer_returns`] of each air of the plan.
-fn returns_of_airs(optics: &LineOptics<'_>) -> Result<Vec<Vec<f64>>, Error> {
+fn returns_of_slants(optics: &LineOptics<'_>) -> Result<Vec<Vec<f64>>, Error> {
     let instruments = optics.plan.instruments();
     instruments
         .iter()

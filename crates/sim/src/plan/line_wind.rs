@@ -15,7 +15,7 @@ use wakescope_signal::RangeFilter;
 pub(crate) struct LineWind {
     /// Radial velocity, m/s; NaN where nothing returns light.
     pub(crate) radial_velocity_m_s: Vec<f64>,
-    /// Of a line whose pulses have airs of their own, the standard deviation of what they see at the gates through the filter of the
+    /// Of a line whose pulses have winds of their own, the standard deviation of what they see at the gates through the filter of the
     /// pulse, m/s.
     pub(crate) spread_m_s: Option<Vec<f64>>,
 }
@@ -39,7 +39,7 @@ pub(crate) fn weighted_at_gates_m_s(
     Ok(out)
 }
 
-/// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have airs of their own.
+/// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have winds of their own.
 pub(crate) fn wind_of_line(
     plan: &Plan,
     wind: &SceneWind,
@@ -60,7 +60,7 @@ pub(crate) fn wind_of_line(
     for pulse in 0..pulses {
         let here = wind_along(plan, wind, &schedule.beam(line, pulse as f64), range_m)?;
         let here_seen_m_s = weighted_at_gates_m_s(filter, g, &here.radial_velocity_m_s)?;
-        // About the first air, so that the mean of equal airs is that air.
+        // About the first air, so that the mean of equal winds is that wind.
         if pulse == 0 {
             (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), here_seen_m_s.clone());
         }

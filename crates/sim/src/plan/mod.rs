@@ -8,7 +8,7 @@
 //! | module | what is in it |
 //! |---|---|
 //! | [`instrument`], [`estimators`] | a scene in the terms of the other crates |
-//! | `airs` | the air of each line, where it changes with height |
+//! | `layered_air` | the air of each line, where it changes with height |
 //! | [`wind`], `line_wind`, `fastest` | the wind: analytic, or the planes of a simulated flow; the wind along beams, its largest velocity |
 //! | [`geometry`], `scan_lines` | lines of sight, samples, gates, layers |
 //! | `described` | pulse and site as files carry them |
@@ -16,10 +16,10 @@
 //! | `schedule`, `warnings` | duration and revisit time of the scan; what the user should know |
 
 use crate::Error;
-use crate::plan::airs::Airs;
 use crate::plan::counts::Counts;
 use crate::plan::geometry::Geometry;
 use crate::plan::instrument::Instrument;
+use crate::plan::layered_air::LayeredAir;
 use crate::plan::wind::SceneWind;
 use crate::quantities;
 use crate::scene::{Flow, Scene, SceneFile};
@@ -27,7 +27,6 @@ use std::fmt;
 use std::sync::Arc;
 use wakescope_optics::plan::Plan as ScreenPlan;
 
-pub(crate) mod airs;
 pub(crate) mod counts;
 pub(crate) mod described;
 pub mod estimators;
@@ -35,6 +34,7 @@ mod fastest;
 pub(crate) mod fit;
 pub mod geometry;
 pub mod instrument;
+pub(crate) mod layered_air;
 pub(crate) mod line_wind;
 pub(crate) mod scan_lines;
 mod schedule;
@@ -56,7 +56,7 @@ pub struct Plan {
     /// The instrument and its air.
     pub instrument: Instrument,
     /// The air of each line, where it changes with height; that of [`Self::instrument`] is of the line in the middle.
-    pub(crate) airs: Airs,
+    pub(crate) layered_air: LayeredAir,
     /// Sampling in angle, range and time.
     pub geometry: Geometry,
     /// The wind.
@@ -95,8 +95,8 @@ impl Plan {
     ) -> Result<Self, Error> {
         let mut instrument = Instrument::new(&file.content)?;
         let geometry = Geometry::new(&file, &instrument.pulse, &wind)?;
-        let airs = Airs::new(&file.content, &instrument, &geometry.schedule)?;
-        if let Some(of_middle_line) = airs.of_middle_line() {
+        let layered_air = LayeredAir::new(&file.content, &instrument, &geometry.schedule)?;
+        if let Some(of_middle_line) = layered_air.of_middle_line() {
             instrument = of_middle_line.clone();
         }
         let counts = Counts::new(&file.content, target, &geometry);
@@ -104,7 +104,7 @@ impl Plan {
             file,
             target,
             instrument,
-            airs,
+            layered_air,
             geometry,
             wind,
             stages: Vec::new(),

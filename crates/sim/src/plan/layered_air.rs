@@ -14,15 +14,15 @@ use wakescope_optics as optics;
 /// Largest ratio of coherence radii within a group.
 const SIMILAR: f64 = 1.02;
 
-/// The airs of the lines of sight; empty where all lines share one.
+/// Aerosol and turbulence of each line of sight; empty where all lines have the same.
 #[derive(Debug, Default)]
-pub(crate) struct Airs {
-    /// The instrument with each air.
+pub(crate) struct LayeredAir {
+    /// The instrument with the air of each distinct slant.
     instruments: Vec<Instrument>,
-    /// Which group of equal turbulence an air belongs to.
-    group_of_air: Vec<usize>,
-    /// Which air each line has.
-    of_line: Vec<usize>,
+    /// Index of the group of equal turbulence of each slant.
+    group_of_slant: Vec<usize>,
+    /// Index of the slant of each line.
+    slant_of_line: Vec<usize>,
 }
 
 /// A distinct place and elevation of a beam: height, m, and elevation, rad.
@@ -33,8 +33,8 @@ fn order(a: &Slant, b: &Slant) -> Ordering {
     a[1].total_cmp(&b[1]).then(a[0].total_cmp(&b[0]))
 }
 
-impl Airs {
-    /// The airs of a scan.
+impl LayeredAir {
+    /// The air of the lines of a scan.
     ///
     /// # Errors
     /// What optics or signals refuse; a checked scene gives none.
@@ -54,7 +54,7 @@ impl Airs {
         slants.sort_by(order);
         slants.dedup();
         let groups = groups(scene, &slants)?;
-        let mut airs = Self::default();
+        let mut air = Self::default();
         for (group, slants) in groups.iter().enumerate() {
             let [height_m, elevation_rad] = slants[slants.len() / 2];
             let turbulence = scene
@@ -62,8 +62,8 @@ impl Airs {
                 .map(|t| t.along(height_m, elevation_rad))
                 .transpose()?;
             for slant in slants {
-                airs.group_of_air.push(group);
-                airs.instruments.push(Instrument {
+                air.group_of_slant.push(group);
+                air.instruments.push(Instrument {
                     air: instrument.air.along(slant[0], slant[1]),
                     turbulence: turbulence.clone(),
                     ..instrument.clone()
@@ -71,21 +71,21 @@ impl Airs {
             }
         }
         if !scene.atmosphere.has_layered_aerosol() {
-            for of_line in &mut airs.instruments {
+            for of_line in &mut air.instruments {
                 of_line.air = instrument.air.clone();
             }
         }
         for slant in &of_lines {
             let position = slants.binary_search_by(|other| order(other, slant));
-            airs.of_line.push(position.unwrap_or(0));
+            air.slant_of_line.push(position.unwrap_or(0));
         }
-        Ok(airs)
+        Ok(air)
     }
 
     /// The air of the line in the middle of the scan, which budget, bound and profile have.
     pub(crate) fn of_middle_line(&self) -> Option<&Instrument> {
-        let air = *self.of_line.get(self.of_line.len() / 2)?;
-        self.instruments.get(air)
+        let slant = *self.slant_of_line.get(self.slant_of_line.len() / 2)?;
+        self.instruments.get(slant)
     }
 }
 
@@ -127,9 +127,9 @@ fn coherence_radius_m(scene: &Scene, [height_m, elevation_rad]: Slant) -> Result
 }
 
 impl Plan {
-    /// The instrument with each air of the scan: one, unless the air changes with height.
+    /// The instrument with the air of each slant of the scan: one, unless the air changes with height.
     pub(crate) fn instruments(&self) -> &[Instrument] {
-        match self.airs.instruments.as_slice() {
+        match self.layered_air.instruments.as_slice() {
             [] => std::slice::from_ref(&self.instrument),
             all => all,
         }
@@ -137,19 +137,27 @@ impl Plan {
 
     /// Which of [`Self::instruments`] a line has.
     pub(crate) fn air_of_line(&self, line: usize) -> usize {
-        self.airs.of_line.get(line).copied().unwrap_or(0)
+        self.layered_air
+            .slant_of_line
+            .get(line)
+            .copied()
+            .unwrap_or(0)
     }
 
     /// Which group of equal turbulence a line belongs to.
     pub(crate) fn turbulence_of_line(&self, line: usize) -> usize {
         let air = self.air_of_line(line);
-        self.airs.group_of_air.get(air).copied().unwrap_or(0)
+        self.layered_air
+            .group_of_slant
+            .get(air)
+            .copied()
+            .unwrap_or(0)
     }
 
     /// One instrument of each group of equal turbulence.
     pub(crate) fn turbulences(&self) -> Vec<&Instrument> {
         let all = self.instruments();
-        let groups = &self.airs.group_of_air;
+        let groups = &self.layered_air.group_of_slant;
         let mut firsts = vec![&all[0]];
         for i in 1..groups.len() {
             if groups[i] != groups[i - 1] {
@@ -161,7 +169,7 @@ impl Plan {
 
     /// The line whose air [`Self::instrument`] has.
     pub(crate) fn reference_line(&self) -> usize {
-        self.airs.of_line.len() / 2
+        self.layered_air.slant_of_line.len() / 2
     }
 }
 
