@@ -201,7 +201,7 @@ const LOCK: &str = "lock";
 
 /// Removes the staging folders that crashed processes left in a folder; those of running processes, and links, stay. Files that
 /// a crashed process had replaced only in part are put back as far as they still exist.
-pub(super) fn sweep_stages(folder: &Path) {
+pub(crate) fn sweep_stages(folder: &Path) {
     for root in entries(folder) {
         if !is_staging_folder(&root) {
             continue;
@@ -282,6 +282,32 @@ impl StagingFolder {
             root,
             _lock: lock,
         }
+    }
+
+    /// Writes one file of any folder of the same file system through the staging folder, whole or not at all; `unique` names it in
+    /// the staging folder. An older file is replaced, folders are made.
+    ///
+    /// # Errors
+    /// The refusal of the system; an older file is then untouched.
+    pub(crate) fn put_file(
+        &self,
+        unique: usize,
+        target: &Path,
+        content: &[u8],
+    ) -> OutputResult<()> {
+        let staged = self.new.join(unique.to_string());
+        let written = fs::write(&staged, content)
+            .and_then(|()| fs::File::open(&staged))
+            .and_then(|file| file.sync_all())
+            .and_then(|()| match target.parent() {
+                Some(parent) => fs::create_dir_all(parent),
+                None => Ok(()),
+            })
+            .and_then(|()| fs::rename(&staged, target));
+        written.map_err(|error| {
+            drop(fs::remove_file(&staged));
+            OutputError::io("write", target, error)
+        })
     }
 
     /// Makes the staging folder of a folder.

@@ -21,6 +21,7 @@
 //! | `text_file`, `netcdf_input` (`netcdf4_input`), `netcdf_dimensions`, `planes_input`, `fields_input`, `units` | (readers) texts, NetCDF, cross-planes and fields in it, units | `netcdf` or `netcdf4` but for texts |
 //! | `lock` | nothing: one writer for a folder at a time | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
+//! | [`zarr`] | arrays of a Zarr v3 group, and their reader | - |
 //! | `cfradial`, `cf_planes`, `cf_fields`, `cf_signals`, `cf_spectra` (through `netcdf`; their variables are described beside them in `.cdl`) | classic NetCDF | `netcdf` |
 
 pub mod atomic;
@@ -59,6 +60,7 @@ pub mod signals;
 mod site;
 pub mod tables;
 pub mod utc;
+pub mod zarr;
 
 pub use atomic::{FileGroup, write_atomic};
 pub use cf_spectra::Spectra;

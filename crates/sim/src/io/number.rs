@@ -61,6 +61,51 @@ impl NumberType {
         ))
     }
 
+    /// By its name in Zarr: `int16`, `uint8`, `float64`.
+    pub(crate) fn from_zarr(name: &str) -> Option<Self> {
+        let digits = name.find(|c: char| c.is_ascii_digit())?;
+        let (kind, bits) = name.split_at(digits);
+        let letter = match kind {
+            "int" => "i",
+            "uint" => "u",
+            "float" => "f",
+            _ => return None,
+        };
+        Self::named(&format!("{letter}{bits}"))
+    }
+
+    /// Its name in Zarr.
+    pub(crate) fn zarr_name(self) -> String {
+        let kind = match self.kind {
+            'i' => "int",
+            'u' => "uint",
+            _ => "float",
+        };
+        format!("{kind}{}", 8 * self.bytes)
+    }
+
+    /// The smallest and the largest code of a whole number of at most 32 bits, which `f64` has exactly.
+    pub(crate) fn code_limits(self) -> (f64, f64) {
+        let codes = 2f64.powi(8 * self.bytes as i32);
+        match self.kind {
+            'i' => (-0.5 * codes, 0.5 * codes - 1.0),
+            _ => (0.0, codes - 1.0),
+        }
+    }
+
+    /// A whole number from its bytes in little-endian order; unsigned ones of 64 bits wrap.
+    pub(crate) fn integer(self, bytes: &[u8]) -> i64 {
+        let mut bits = 0_u64;
+        for byte in bytes.iter().rev() {
+            bits = bits << 8 | u64::from(*byte);
+        }
+        let unused = 64 - 8 * self.bytes;
+        match self.kind {
+            'i' => (bits << unused) as i64 >> unused,
+            _ => bits as i64,
+        }
+    }
+
     pub(crate) fn is_float(self) -> bool {
         self.kind == 'f'
     }
@@ -134,6 +179,18 @@ mod tests {
         let zeros = ["u8", "u16", "i16", "f32", "u64"].map(|name| named(name).zero());
         assert_eq!(zeros, [128.0, 32_768.0, 0.0, 0.0, 0.0]);
         assert_eq!(NumberType::from_numpy("i2"), NumberType::named("i16"));
+        for (zarr, name) in [("uint8", "u8"), ("int16", "i16"), ("float64", "f64")] {
+            let number = named(name);
+            assert_eq!(NumberType::from_zarr(zarr), Some(number));
+            assert_eq!(number.zarr_name(), zarr);
+        }
+        assert_eq!(NumberType::from_zarr("complex64"), None);
+        assert_eq!(named("i16").code_limits(), (-32_768.0, 32_767.0));
+        assert_eq!(named("i16").integer(&(-2_i16).to_le_bytes()), -2);
+        assert_eq!(
+            named("u64").integer(&u64::MAX.to_le_bytes()) as u64,
+            u64::MAX
+        );
         assert_eq!(
             (NumberType::from_numpy("i8"), named("i8").bytes),
             (NumberType::named("i64"), 1)
