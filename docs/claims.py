@@ -392,6 +392,18 @@ def f19a():
     return [f"{max(ratios, key=lambda ratio: abs(ratio - 1.0)):.3f}"]
 
 
+def ap1():
+    """Medians of draws over those of records, from the table: the errors of both as independent ones."""
+    table = {(r["pulses_are"], r["pulses_per_line"]): (r["median_error_m_s"], r["standard_error_m_s"]) for r in rows("fig26")}
+    found = []
+    for (way, pulses), (records, error) in table.items():
+        drawn = table.get(("drawn at once", pulses))
+        if way == "record by record" and drawn:
+            ratio = drawn[0] / records
+            found.append(words((ratio, ratio * math.hypot(drawn[1] / drawn[0], error / records))))
+    return found
+
+
 CLAIMS = {
     "T1": t1, "F1b": f1b, "F4a": f4a, "F4b": f4b, "F4c": f4c, "F4d": f4d, "F6a": f6a, "F6b": f6b, "F7d": f7d, "F7e": f7e, "F8": f8,
     "F9b": f9b, "F10": f10, "F12a": f12a, "F12b": f12b, "F12c": f12c, "F13": f13, "F14a": f14a, "F14b": f14b,
@@ -400,7 +412,7 @@ CLAIMS = {
     "F17i": lambda: retrieved("simulated wake, tau = 2.5", "fit"), "F17j": lambda: retrieved("simulated wake, tau = 4", "fit"),
     "F18a": lambda: over_bound(0.0, 15.0), "F18b": lambda: over_bound(-5.0, 20.0), "F18c": lambda: bad(20), "F18d": lambda: bad(60),
     "F16b": f16b, "F19a": f19a,
-    "CP1": cp1, "CP2": cp2, "CP3": cp3, "CP4": cp4, "CP5": cp5, "CP6": cp6,
+    "CP1": cp1, "CP2": cp2, "CP3": cp3, "CP4": cp4, "CP5": cp5, "CP6": cp6, "AP1": ap1,
 }  # fmt: skip
 MEASURED = {row["id"]: row["measured"] for row in rows("claims")}
 

@@ -22,6 +22,7 @@ pub(crate) mod fig17_flows;
 mod fig18;
 mod fig19;
 mod fig25;
+mod fig26;
 mod profiles;
 mod study;
 mod tab01;
@@ -109,7 +110,7 @@ impl Figure {
     pub(crate) fn lane(&self) -> Lane {
         match self.number {
             6..=14 | 17 | 25 => Lane::Wake,
-            15 => Lane::Alone,
+            15 | 26 => Lane::Alone,
             _ => Lane::Formula,
         }
     }
@@ -147,7 +148,7 @@ const fn figure(
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 21] = [
+pub(crate) const ALL: [Figure; 22] = [
     figure(
         "fig01",
         1,
@@ -265,6 +266,14 @@ pub(crate) const ALL: [Figure; 21] = [
         fig25::make,
     )
     .with_row(0, 3),
+    figure(
+        "fig26",
+        26,
+        "Run time against pulses a line",
+        10.0,
+        fig26::make,
+    )
+    .with_row(0, 2),
 ];
 
 #[cfg(test)]

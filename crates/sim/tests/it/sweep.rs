@@ -167,6 +167,29 @@ fn results_have_the_same_bytes_for_threads_shards_and_after_a_kill() {
 }
 
 #[test]
+fn draws_of_many_pulses_have_the_same_bytes_for_any_shard() {
+    let temp = folder();
+    let at = temp.path();
+    let words = [
+        "sweep",
+        "s.toml",
+        "--vary",
+        "scan.pulses_per_line=2000,4000,8000",
+        "--quiet",
+        "--out",
+    ];
+    ran(at, &[&words[..], &["whole", "--threads", "2"]].concat());
+    for (shard, out) in [("1/2", "first"), ("2/2", "second")] {
+        ran(at, &[&words[..], &[out, "--shard", shard]].concat());
+    }
+    ran(
+        at,
+        &["sweep", "--merge", "first", "second", "--out", "merged"],
+    );
+    assert!(read(at, "merged/results.csv") == read(at, "whole/results.csv"));
+}
+
+#[test]
 fn shards_that_begin_together_in_one_folder_all_end() {
     let temp = folder();
     let at = temp.path();
