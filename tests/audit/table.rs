@@ -39,7 +39,7 @@ const WITHOUT: &[(&str, &str)] = &[
     ),
     (
         "wind.csv: *",
-        "random, or its time: what beams without noise tell is held, and the errors of noise by closed forms",
+        "of a fit to random velocities, or the time and kind of its window: held over 200 cones by tests of `wakescope wind`",
     ),
     ("map.nc: drift", "held with the heading, as the track"),
     ("map.nc: heading", "held with the drift, as the track"),

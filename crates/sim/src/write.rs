@@ -13,7 +13,6 @@ use crate::Error;
 
 use crate::io::signals::RawSignals;
 use crate::io::{Existing, Table, VelocityMap, hpl, tables};
-use crate::measure::beam_winds;
 use crate::measure::profile::RangeProfile;
 use crate::measure::recorded::{Recorded, Spectra, measured_map, predicted_table};
 use crate::outputs::Outputs;
@@ -22,6 +21,7 @@ use crate::run::RunResult;
 #[cfg(feature = "plots")]
 use crate::scene::Pattern;
 use crate::scene::{DetectorSignal, NoiseModel};
+use crate::wind::{table_with_truth, winds_of_map};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -103,18 +103,16 @@ fn list_estimates(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resul
     let estimates = result.map.as_ref();
     let map = estimates.map(|estimates| velocity_map(plan, estimates));
     list_map(plan, map.as_ref(), files)?;
-    let winds = match estimates {
-        Some(estimates) => beam_winds::beam_winds(plan, estimates)?,
+    let winds = match &map {
+        Some(map) => winds_of_map(plan, map)?,
         None => None,
     };
     if pattern.has_beam_winds() {
-        files.table("wind", winds.as_deref(), |winds| {
-            Ok(beam_winds::table(winds))
-        })?;
+        files.table("wind", winds.as_ref(), |winds| Ok(table_with_truth(winds)))?;
     }
     #[cfg(feature = "plots")]
     files.figure("map", map.as_ref(), |map| {
-        pictures::map(plan, map, winds.as_deref())
+        pictures::map(plan, map, winds.as_ref())
     })?;
     #[cfg(feature = "plots")]
     if *pattern != Pattern::default() {

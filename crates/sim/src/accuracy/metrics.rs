@@ -3,8 +3,8 @@
 //! Runs have the seed in common, so a shift is taken realisation by realisation and its standard error by the jackknife of the
 //! ratio (Efron 1982). A shift is no error against the truth: coarse settings smooth, and may look better than fine ones.
 
+use super::mean_wind::mean_wind_m_s;
 use crate::Error;
-use crate::measure::beam_winds::mean_wind_m_s;
 use crate::measure::map::VelocityEstimates;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;

@@ -13,6 +13,7 @@
 
 mod flow;
 pub mod keys;
+mod mean_wind;
 pub mod metrics;
 #[cfg(feature = "plots")]
 mod picture;

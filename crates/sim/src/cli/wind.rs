@@ -161,9 +161,7 @@ fn add_gate(
     options.gate_std_m = gate.std_m();
     options.gate_stride = first.gate_stride.max(1);
     if let Some(scene) = content {
-        let window = scene.estimator.window_samples as f64;
-        let step = scene.estimator.gate_step_samples.max(1) as f64;
-        options.gate_stride = (window / step).ceil() as usize;
+        options.gate_stride = wind::gate_stride(scene);
     }
     Ok(scene)
 }

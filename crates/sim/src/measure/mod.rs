@@ -5,7 +5,6 @@
 //! | [`profile`], `screens` | efficiency and signal-to-noise ratio against range; its phase screens |
 //! | [`scan`], `scan_stages` | the records of the lines of sight; what they need |
 //! | `accumulation` | whether the products of a line are summed over records or drawn at once |
-//! | [`beam_winds`] | winds from the beams of VAD and DBS scans |
 //! | [`map`], `map_stages`, `map_estimator`, `gate_estimates` | estimates and their errors against the truth; what they need |
 //! | [`error_law`], [`cell_average`] | the law of these errors, averages of them over cells, their standard errors |
 //! | [`recorded`] | the same from the records of a file, measured or simulated |
@@ -16,7 +15,6 @@
 //! | `response`, `plane` | what the estimators show of a wake; the wind on a cross-plane |
 
 pub(crate) mod accumulation;
-pub mod beam_winds;
 pub mod bound;
 pub mod budget;
 pub mod cell_average;

@@ -7,6 +7,7 @@
 //! | `heights` | bins of height, and the wind of each among bad velocities |
 //! | `turbulence` | dissipation and noise of layers, the outer scale |
 //! | `rows` | standard errors, derived quantities and flags of each window and height |
+//! | `of_map` | winds of a scan of this program, beside the true ones |
 //! | `table`, `netcdf`, `pictures` | the files |
 //!
 //! Check: files of known winds of an independent program (`tests/reference/wind`), in the tests of the program.
@@ -15,6 +16,7 @@ mod cross_wind;
 mod directions;
 mod heights;
 mod netcdf;
+mod of_map;
 #[cfg(feature = "plots")]
 mod pictures;
 mod rows;
@@ -25,6 +27,8 @@ mod windows;
 pub use cross_wind::CrossWind;
 pub use directions::Kind;
 pub use netcdf::netcdf;
+pub(crate) use of_map::gate_stride;
+pub use of_map::{MapWinds, table_with_truth, winds_of_map};
 #[cfg(feature = "plots")]
 pub use pictures::figure;
 pub use rows::{Flag, WindRow};

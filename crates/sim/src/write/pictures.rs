@@ -2,13 +2,13 @@
 //! Check: by eye; a test of the program compares the names of the files.
 
 use crate::Error;
-use crate::beams::{Direction, SweepMode};
+use crate::beams::SweepMode;
 use crate::io::VelocityMap;
-use crate::measure::beam_winds::BeamWind;
 use crate::measure::profile::RangeProfile;
 use crate::plan::Plan;
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 use crate::scene::SnrReference;
+use crate::wind::{MapWinds, WindRow};
 use wakescope_les::winds::Vortex;
 use wakescope_optics::EfficiencyProfile;
 
@@ -92,7 +92,7 @@ fn efficiency_curve(
 pub(super) fn map(
     plan: &Plan,
     map: &VelocityMap,
-    winds: Option<&[BeamWind]>,
+    winds: Option<&MapWinds>,
 ) -> Result<Figure, Error> {
     let centres_m = centres_m(plan);
     let sweep = if plan.geometry.schedule.is_plane() {
@@ -208,7 +208,7 @@ fn lines(plan: &Plan, map: &VelocityMap) -> Figure {
 }
 
 /// Radial velocity over azimuth at the middle range of the first sweep, with the sine curve of its wind.
-fn azimuth_display(plan: &Plan, map: &VelocityMap, winds: &[BeamWind]) -> Figure {
+fn azimuth_display(plan: &Plan, map: &VelocityMap, winds: &MapWinds) -> Figure {
     let gate = map.range_m.len() / 2;
     let x = Axis::linear("azimuth [degrees]");
     let mut plot = CurvePlot::new("", x, Axis::linear("radial velocity [m/s]"));
@@ -230,23 +230,34 @@ fn azimuth_display(plan: &Plan, map: &VelocityMap, winds: &[BeamWind]) -> Figure
         });
         plot = plot.with(Series::new(label, Style::Markers, points));
     }
-    if let (Some(wind), Some(&ray)) = (winds.get(gate), rays.first()) {
-        let (zero_rad, from_x_rad) = plan.geometry.schedule.mount.reference_rad;
-        let curve = (0..=180).map(|i| {
-            let azimuth_rad = f64::from(2 * i).to_radians();
-            let direction = Direction::new(
-                (azimuth_rad - zero_rad) + from_x_rad,
-                map.rays[ray].elevation_rad,
-            );
-            (
-                f64::from(2 * i),
-                direction.radial_velocity_m_s(wind.wind_m_s, [0.0; 3]),
-            )
-        });
+    if let (Some(wind), Some(&ray)) = (wind_of_gate(winds, map, gate), rays.first()) {
+        let (up, level) = map.rays[ray].elevation_rad.sin_cos();
+        let mut curve = Vec::with_capacity(181);
+        for azimuth_deg in (0..=360).step_by(2).map(f64::from) {
+            let (east, north) = azimuth_deg.to_radians().sin_cos();
+            let level_m_s = east * wind.east_m_s.value + north * wind.north_m_s.value;
+            curve.push((azimuth_deg, level * level_m_s + up * wind.up_m_s.value));
+        }
         plot = plot.with(Series::new("its sine curve", Style::Line, curve));
     }
     let range_m = map.range_m.get(gate).copied().unwrap_or(f64::NAN);
     Figure::stacked([plot]).titled(&format!("{}; at {range_m:.0} m", title(plan, false)))
+}
+
+/// The wind of the first sweep at the height of a gate of its first line.
+fn wind_of_gate<'w>(winds: &'w MapWinds, map: &VelocityMap, gate: usize) -> Option<&'w WindRow> {
+    let first = map.rays.first()?;
+    let height_m = map.range_m.get(gate)? * first.elevation_rad.sin();
+    let mut nearest_m = f64::INFINITY;
+    let mut nearest = None;
+    for row in &winds.profiles.rows {
+        let from_m = (row.height_m - height_m).abs();
+        if row.window == 1 && row.has_wind() && from_m < nearest_m {
+            nearest_m = from_m;
+            nearest = Some(row);
+        }
+    }
+    nearest
 }
 
 /// Lines of sight that a plan of the scan draws.

@@ -4,11 +4,11 @@ use netcdf3::FileReader;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
 use wakescope_sim::io::Existing;
-use wakescope_sim::measure::beam_winds::beam_winds;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::scene::SceneFile;
-use wakescope_sim::write::write;
+use wakescope_sim::wind::winds_of_map;
+use wakescope_sim::write::{velocity_map, write};
 use wakescope_sim::{Error, Silent, run};
 
 /// A scene with few lines at 10 dB; the words in capitals are replaced.
@@ -226,9 +226,10 @@ fn the_truth_of_a_line_is_the_mean_over_its_pulses_with_their_spread() {
 }
 
 #[test]
-fn vad_and_dbs_of_a_scan_tell_the_wind_with_their_errors() {
+fn vad_and_dbs_of_a_scan_determine_the_wind_with_its_standard_errors() {
     let uniform = "kind = \"linear\"\nvelocity_m_s = [6.0, -3.0, 0.2]";
-    let wind = [6.0, -3.0, 0.2];
+    // The flight is to the north.
+    let wind = [-3.0, 6.0, 0.2];
     for (scan, beams) in [
         (
             "pattern = { kind = \"vad\", elevation_rad = 1.1, beams = 24 }\nhead.sweeps = 2",
@@ -241,29 +242,23 @@ fn vad_and_dbs_of_a_scan_tell_the_wind_with_their_errors() {
     ] {
         let plan = plan(uniform, scan);
         let map = map(&plan);
-        let winds = beam_winds(&plan, &map).unwrap().unwrap();
-        assert_eq!(winds.len(), 2 * map.range_m.len());
-        let cos = 1.1f64.cos();
-        for (i, found) in winds.iter().enumerate() {
-            assert!((found.height_m - found.range_m * 1.1f64.sin()).abs() < 1e-6);
-            let gate = i % map.range_m.len();
-            let sigma = map.std_m_s.column(gate).mean().unwrap().max(0.1);
-            for (d, wind) in wind.iter().enumerate() {
-                assert!(
-                    (found.true_m_s[d] - wind).abs() < 1e-12
-                        && (found.noiseless_m_s[d] - wind).abs() < 1e-9
-                );
-                // (u, v) of white noise: sigma sqrt(2/N)/cos.
-                assert!(
-                    (found.mean_m_s[d] - wind).abs() < 6.0 * sigma * (2.0 / beams).sqrt() / cos,
-                    "{found:?}"
-                );
-                assert!(
-                    found.std_m_s[d] > 0.0
-                        && found.std_m_s[d] < 10.0 * sigma * (2.0 / beams).sqrt() / cos
-                );
-                assert_eq!(found.error_bar_m_s[d].is_nan(), beams == 4.0);
+        let found = winds_of_map(&plan, &velocity_map(&plan, &map));
+        let winds = found.unwrap().unwrap();
+        assert_eq!(winds.profiles.rows.len(), 2 * map.range_m.len());
+        // White noise on the beams of a cone, in the horizontal components.
+        let sigma_m_s = map.std_m_s.mean().unwrap();
+        let expected_m_s = sigma_m_s * (2.0 / beams).sqrt() / 1.1f64.cos();
+        for (i, (row, true_m_s)) in winds.profiles.rows.iter().zip(&winds.true_m_s).enumerate() {
+            let range_m = map.range_m[i % map.range_m.len()];
+            assert!((row.height_m - range_m * 1.1f64.sin()).abs() < 1e-6);
+            let found = [row.east_m_s, row.north_m_s, row.up_m_s];
+            for (axis, found) in found.into_iter().enumerate() {
+                assert!((true_m_s[axis] - wind[axis]).abs() < 1e-12);
+                let error_m_s = (found.value - wind[axis]).abs();
+                assert!(error_m_s < 6.0 * found.std.max(expected_m_s), "{row:?}");
             }
+            let over = row.east_m_s.std / expected_m_s;
+            assert!((0.1..10.0).contains(&over), "{over}: {row:?}");
         }
     }
 }

@@ -477,3 +477,35 @@ fn intervals_of_a_cone_cover_the_wind_in_turbulence_with_and_without_bad_gates()
         }
     }
 }
+
+/// A scan of one realisation, whose map is that of its file.
+const OWN: &str = "[flow]\nkind = \"wind\"\nprofile = \"power\"\nexponent = 0.3\nspeed_m_s = 6.0\ntoward_rad = 1.0\n\
+    [detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n[scan]\npattern = { kind = \"vad\", beams = 18 }\nrealisations = 1\n\
+    range_min_m = 300.0\nrange_max_m = 400.0\n[estimator]\ngate_step_samples = 20\n[outputs]\npng = false\n";
+
+#[test]
+fn winds_of_a_run_are_those_of_the_command_and_beside_the_true_ones() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("s.toml"), OWN).unwrap();
+    let output = wakescope(temp.path(), &["run", "s.toml", "--out", "out"]);
+    assert!(output.status.success(), "{output:?}");
+    let own = table(&temp.path().join("out/wind.csv"));
+    let read = winds(&[temp.path().join("out/map.nc")], "--every sweep");
+    assert!(!own.is_empty() && own.len() == read.len());
+    for (own, read) in own.iter().zip(&read) {
+        for name in HEADER.split(',') {
+            let apart = number(own, name) - number(read, name);
+            // Files have floats of four bytes.
+            let is_equal = own[name] == read[name] || apart.abs() < 1e-3;
+            assert!(is_equal, "{name}: {} {}", own[name], read[name]);
+        }
+        let speed_m_s = 6.0 * (number(own, "height_m") / 10.0).powf(0.3);
+        for (name, part) in [("east", 1f64.sin()), ("north", 1f64.cos()), ("up", 0.0)] {
+            let true_m_s = number(own, &format!("{name}_true_m_s"));
+            assert!((true_m_s - speed_m_s * part).abs() < 1e-6, "{own:?}");
+            let error_m_s = number(own, &format!("{name}_m_s")) - true_m_s;
+            let std_m_s = number(own, &format!("{name}_std_m_s"));
+            assert!(error_m_s.abs() < 5.0 * std_m_s, "{own:?}");
+        }
+    }
+}

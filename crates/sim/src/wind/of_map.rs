@@ -1,0 +1,124 @@
+//! Winds of a scan of this program: those that `wakescope wind` finds in its first realisation, beside the true ones.
+//!
+//! Check: a scan of one realisation has the winds of its own `map.nc`; the truth of linear winds.
+
+use super::{Every, WindOptions, WindProfiles, Window, table, wind_profiles, windows};
+use crate::Error;
+use crate::beams::Direction;
+use crate::io::Table;
+use crate::io::map::VelocityMap;
+use crate::io::scans::{Ray, RaySweep};
+use crate::plan::Plan;
+use crate::retrieve::gate_of_instrument;
+use crate::scene::Scene;
+use std::f64::consts::FRAC_PI_2;
+
+/// Winds of a scan and of the air.
+#[derive(Debug, Clone, Default)]
+pub struct MapWinds {
+    /// What the velocities of the first realisation tell.
+    pub profiles: WindProfiles,
+    /// True wind (east, north, up) above the lidar at the height and in the middle of the window of each row, m/s, without the turbulence
+    /// of `"eddies"`: the mean wind is what a scan is to find. NaN where it is not known.
+    pub true_m_s: Vec<[f64; 3]>,
+}
+
+impl WindOptions {
+    /// The gates of a scene.
+    ///
+    /// # Errors
+    /// What pulse or window refuse; a checked scene gives none.
+    pub fn of_scene(scene: &Scene) -> Result<Self, Error> {
+        let (gate, _) = gate_of_instrument(None, None, None, Some(scene))?;
+        Ok(Self {
+            gate_std_m: gate.std_m(),
+            gate_stride: gate_stride(scene),
+            ..Self::default()
+        })
+    }
+}
+
+/// Gates this many apart share no samples.
+pub(crate) fn gate_stride(scene: &Scene) -> usize {
+    let step = scene.estimator.gate_step_samples.max(1);
+    scene.estimator.window_samples.div_ceil(step)
+}
+
+/// The winds of a scan whose beams determine them, VAD and DBS; a window for each sweep.
+///
+/// # Errors
+/// What the fits or the wind refuse; a checked scene gives none.
+pub fn winds_of_map(plan: &Plan, map: &VelocityMap) -> Result<Option<MapWinds>, Error> {
+    if !plan.scene().scan.pattern.has_beam_winds() {
+        return Ok(None);
+    }
+    let (windows, reference, _) = windows(ray_sweeps(map), Every::Sweep)?;
+    let options = WindOptions::of_scene(plan.scene())?;
+    let profiles = wind_profiles(&windows, reference, &options)?;
+    let true_m_s = true_winds_m_s(plan, map, &windows, &profiles)?;
+    Ok(Some(MapWinds { profiles, true_m_s }))
+}
+
+/// The lines of sight of the first realisation.
+fn ray_sweeps(map: &VelocityMap) -> Vec<RaySweep> {
+    let mut sweeps = Vec::with_capacity(map.sweeps.len());
+    for sweep in 0..map.sweeps.len() {
+        sweeps.push(RaySweep {
+            sweep,
+            reference: Some(map.start()),
+            ..RaySweep::default()
+        });
+    }
+    let fold_m_s = (!map.pulse.is_mirrored()).then_some(2.0 * map.pulse.nyquist_velocity_m_s);
+    let Some(field) = map.field("v_scan") else {
+        return sweeps;
+    };
+    for (ray, velocity_m_s) in map.rays.iter().zip(field.values.rows()) {
+        sweeps[ray.sweep].rays.push(Ray {
+            azimuth_rad: ray.azimuth_rad,
+            elevation_rad: ray.elevation_rad,
+            time_s: ray.time_s,
+            range_m: map.range_m.clone(),
+            velocity_m_s: velocity_m_s.to_vec(),
+            sigma_m_s: Vec::new(),
+            fold_m_s,
+        });
+    }
+    sweeps
+}
+
+/// True winds of rows (east, north, up), m/s.
+fn true_winds_m_s(
+    plan: &Plan,
+    map: &VelocityMap,
+    windows: &[Window],
+    profiles: &WindProfiles,
+) -> Result<Vec<[f64; 3]>, Error> {
+    let x_axis_rad = map.flight.map_or(FRAC_PI_2, |(_, azimuth_rad)| azimuth_rad);
+    let east = Direction::new(FRAC_PI_2 - x_axis_rad, 0.0).0;
+    let north = Direction::new(-x_axis_rad, 0.0).0;
+    let lidar_m = plan.geometry.schedule.mount.position_m;
+    let mut winds_m_s = Vec::with_capacity(profiles.rows.len());
+    for row in &profiles.rows {
+        let rays = &windows[row.window - 1].rays;
+        let time_s = rays.iter().map(|ray| ray.time_s).sum::<f64>() / rays.len() as f64;
+        let above_m = [lidar_m[0], lidar_m[1], lidar_m[2] + row.height_m];
+        let mut found = [[f64::NAN; 3]];
+        let air = plan.wind.without_eddies();
+        air.velocity_into(&[above_m], time_s, &mut found)?;
+        let [u, v, w] = found[0];
+        winds_m_s.push([u * east[0] + v * east[1], u * north[0] + v * north[1], w]);
+    }
+    Ok(winds_m_s)
+}
+
+/// The table of winds with the true ones.
+#[must_use]
+pub fn table_with_truth(winds: &MapWinds) -> Table {
+    let mut all = table(&winds.profiles);
+    for (axis, name) in ["east", "north", "up"].into_iter().enumerate() {
+        let values: Vec<f64> = winds.true_m_s.iter().map(|wind| wind[axis]).collect();
+        all = all.float(&format!("{name}_true_m_s"), values);
+    }
+    all
+}
