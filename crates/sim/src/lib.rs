@@ -38,6 +38,7 @@
 //! | [`mod@write`] | writing the results of a run |
 //! | [`accuracy`] | numerical error and run time, setting by setting |
 //! | [`sweep`] | design studies: many scenes, their results, the Pareto front |
+//! | [`score`] | predictions against the truth of a data set |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`io`], [`plot`] | file formats, pictures |
 //! | `processes` | the processes of `mpirun` as ranks of a flow |
@@ -66,6 +67,7 @@ mod quantities;
 pub mod retrieve;
 pub mod run;
 pub mod scene;
+pub mod score;
 mod stages;
 pub mod streams;
 pub mod sweep;

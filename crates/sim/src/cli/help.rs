@@ -11,7 +11,7 @@ const GROUPS: [(&str, &[&str]); 4] = [
         "Estimate and retrieve",
         &["estimate", "retrieve", "detect", "wind"],
     ),
-    ("Study", &["sweep", "accuracy", "bound", "budget"]),
+    ("Study", &["sweep", "score", "accuracy", "bound", "budget"]),
     ("Set up", &["init", "check"]),
 ];
 

@@ -16,6 +16,7 @@ mod options;
 mod output;
 mod progress;
 mod retrieve;
+mod score;
 mod sweep;
 mod wind;
 
@@ -130,6 +131,8 @@ enum Command {
     Detect(detect::DetectArgs),
     /// Find wind over height and turbulence from scans of any lidar.
     Wind(wind::WindArgs),
+    /// Score predictions against the truth of a data set.
+    Score(score::ScoreArgs),
     /// Run a scene with varied keys; tabulate and plot the results.
     Sweep {
         /// Scene file that all cases are based on.
@@ -270,6 +273,7 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
         } => bound::budget(scene, range, out.as_deref(), *overwrite, cli),
         Command::Detect(args) => detect::detect(args, cli),
         Command::Wind(args) => wind::wind(args, cli),
+        Command::Score(args) => score::score(args, cli),
         Command::Sweep {
             scene,
             request,

@@ -14,6 +14,7 @@
 //! | [`csv_input`] | (reader) tables of texts | - |
 //! | [`raw`], [`number`] | (readers) raw signals in NetCDF, NPY, NPZ and binary files | - |
 //! | [`scans`] | (readers) scans of radial velocity: CfRadial, `.hpl`, tables | - |
+//! | [`data_set`] | (reader) data sets of scans with their truth | - |
 //! | [`scan_list`] | (reader) lines of sight of a scan | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`parts`] | (data) files in parts, for ranks that write them together | - |
@@ -42,6 +43,7 @@ pub mod cf_spectra;
 pub mod cfradial;
 pub mod csv;
 pub mod csv_input;
+pub mod data_set;
 pub(crate) mod edges;
 mod error;
 mod existing;

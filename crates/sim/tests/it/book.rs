@@ -255,6 +255,7 @@ fn options_that_pages_name_exist() {
         "detect",
         "wind",
         "sweep",
+        "score",
         "bound",
         "budget",
         "flow",

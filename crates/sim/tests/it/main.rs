@@ -35,6 +35,7 @@ mod scan_fields;
 #[cfg(feature = "plots")]
 mod scans;
 mod scene_features;
+mod score;
 mod simulated_flow;
 #[cfg(all(feature = "cli", feature = "plots"))]
 mod sweep;

@@ -2,6 +2,7 @@
 //! what the command gives, or is refused. An option that is not known here fails the test.
 
 use super::estimate::{npy, npz, samples};
+use super::score::data_set;
 use super::wakescope;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -251,6 +252,8 @@ const KINDS: &[Kind] = &[
         "sweep",
         "tiny.toml --vary scan.lidar_height_m=1,2 --merge swept --out out",
     ),
+    all("score", "d d/p.csv"),
+    all("score", "d d/p.csv --out out"),
     all("accuracy", "tiny.toml --within 0.1 --out out"),
     all("flow", "flow.toml --out out"),
     all("flow", "flow.toml --check"),
@@ -332,6 +335,8 @@ fn value(command: &str, option: &str) -> Option<&'static [&'static str]> {
         (_, "where") => &["scan.lidar_height_m > 1"],
         (_, "merge") => &["swept"],
         (_, "shard") => &["1/2"],
+        (_, "split") => &["test_home"],
+        (_, "least") => &["100"],
         (_, "within") => &["0.2"],
         (_, "of") => &["std"],
         (_, "end") => &["0.01"],
@@ -339,7 +344,8 @@ fn value(command: &str, option: &str) -> Option<&'static [&'static str]> {
         (
             _,
             "complex" | "towards" | "spectra" | "pairs-only" | "independent" | "no-circulation"
-            | "print" | "check" | "overwrite" | "force" | "restart" | "resume" | "use-status",
+            | "print" | "check" | "overwrite" | "force" | "restart" | "resume" | "use-status"
+            | "missing-is-none",
         ) => &[],
         _ => return None,
     })
@@ -485,6 +491,7 @@ fn inputs() -> TempDir {
         "few.csv",
         table(&folder.join("few/map.csv"), false).as_bytes(),
     );
+    data_set(&folder.join("d"), None);
     let (few, _) = samples(&folder.join("few/signals.nc"));
     write("few.npy", &npy(false, &[few.len() / count, count], &few));
     temp
