@@ -11,6 +11,7 @@ mod cause;
 mod ci;
 mod claim;
 mod column_tables;
+mod conformance;
 mod cost;
 mod figures;
 mod fit_trials;
@@ -136,6 +137,15 @@ enum Task {
         #[arg(long, value_name = "DIR")]
         keep: Option<PathBuf>,
     },
+    /// Write the conformance set: scans with exact truth in files of every format.
+    Conformance {
+        /// Folder to write to.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Replace the files of an earlier set.
+        #[arg(long)]
+        overwrite: bool,
+    },
     /// Build the book as a static site, with the documentation of the crates beside it.
     Book,
     /// Check the rules of the house.
@@ -173,6 +183,7 @@ fn run(task: Task) -> Outcome {
             program,
             keep,
         } => audit::run(program.as_deref(), seed, first..first + scenes, keep),
+        Task::Conformance { out, overwrite } => conformance::run(&out, overwrite),
         Task::Book => book::run(),
         Task::Tidy => tidy::run(),
         Task::Ci { only } => ci::run(only.as_deref()),

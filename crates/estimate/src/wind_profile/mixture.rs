@@ -44,8 +44,8 @@ pub struct RadialVelocities<'a> {
     pub velocity_m_s: &'a [f64],
     /// Half the width of the band of bad velocities \[m/s\].
     pub half_band_m_s: f64,
-    /// Velocities repeat after this width \[m/s\].
-    pub fold_m_s: Option<f64>,
+    /// Width after which each velocity repeats \[m/s\], infinite for one that does not; empty if none does.
+    pub folds_m_s: &'a [f64],
 }
 
 /// A wind and the quality of its fit.
@@ -93,7 +93,8 @@ impl MixtureFit {
 /// components. `start_m_s` is one more start, as the solution of a neighbouring height.
 ///
 /// # Errors
-/// [`Error::Length`] unless there is a row for each velocity; [`Error::OutOfRange`] for a band or a width that is not above 0.
+/// [`Error::Length`] unless there is a row and, if any, a width for each velocity; [`Error::OutOfRange`] for a band or a width that is
+/// not above 0.
 pub fn fit_mixture(
     data: &RadialVelocities<'_>,
     start_m_s: Option<&[f64]>,
@@ -102,8 +103,13 @@ pub fn fit_mixture(
     let components = data.rows.ncols();
     length("velocity_m_s", data.rows.nrows(), count)?;
     positive("half_band_m_s", data.half_band_m_s)?;
-    if let Some(fold_m_s) = data.fold_m_s {
-        positive("fold_m_s", fold_m_s)?;
+    if !data.folds_m_s.is_empty() {
+        length("folds_m_s", data.folds_m_s.len(), count)?;
+    }
+    for fold_m_s in data.folds_m_s {
+        if *fold_m_s != f64::INFINITY {
+            positive("folds_m_s", *fold_m_s)?;
+        }
     }
     if count < components {
         return Ok(None);
@@ -145,9 +151,9 @@ impl RadialVelocities<'_> {
         for (a, wind) in self.rows.row(index).iter().zip(wind_m_s) {
             residual -= a * wind;
         }
-        match self.fold_m_s {
-            Some(fold) => residual - fold * (residual / fold).round(),
-            None => residual,
+        match self.folds_m_s.get(index) {
+            Some(fold) if *fold != f64::INFINITY => residual - fold * (residual / fold).round(),
+            _ => residual,
         }
     }
 

@@ -134,7 +134,7 @@ fn mixture(name: &str) -> (Option<MixtureFit>, Row) {
         rows: ndarray::ArrayView2::from_shape(shape, &directions).unwrap(),
         velocity_m_s: &velocity_m_s,
         half_band_m_s: expected.at("nyquist_m_s"),
-        fold_m_s: None,
+        folds_m_s: &[],
     };
     (fit_mixture(&data, None).unwrap(), expected)
 }
@@ -309,4 +309,40 @@ fn cost_of_a_block_of_512_velocities() {
     let start = std::time::Instant::now();
     let found = spectra(&blocks, &covariance).unwrap();
     println!("block {:?}, {} contrasts", start.elapsed(), found[0].len());
+}
+
+#[test]
+fn velocities_of_two_nyquist_intervals_are_fitted_each_in_its_own() {
+    let wind_m_s = [12.0, 0.5];
+    let mut rows = Vec::new();
+    let mut velocity_m_s = Vec::new();
+    let mut folds_m_s = Vec::new();
+    for line in 0..60_u32 {
+        let (up, along) = (4e-3 * f64::from(line / 2)).sin_cos();
+        let fold_m_s = [19.375, f64::INFINITY][line as usize % 2];
+        let velocity = along * wind_m_s[0] + up * wind_m_s[1];
+        rows.extend([along, up]);
+        velocity_m_s.push(match line % 2 {
+            0 => velocity - fold_m_s * (velocity / fold_m_s).round(),
+            _ => velocity,
+        });
+        folds_m_s.push(fold_m_s);
+    }
+    let mut data = RadialVelocities {
+        rows: ndarray::ArrayView2::from_shape((60, 2), &rows).unwrap(),
+        velocity_m_s: &velocity_m_s,
+        half_band_m_s: 20.0,
+        folds_m_s: &folds_m_s,
+    };
+    let fit = fit_mixture(&data, None).unwrap().unwrap();
+    for (found, expected) in fit.wind_m_s.iter().zip(wind_m_s) {
+        assert!((found - expected).abs() < 1e-9, "{:?}", fit.wind_m_s);
+    }
+    assert!(fit.good() > 59.0);
+    // As if nothing repeated, half of the velocities are bad.
+    data.folds_m_s = &[];
+    let without = fit_mixture(&data, None).unwrap().unwrap();
+    assert!(without.good() < 31.0);
+    data.folds_m_s = &folds_m_s[..59];
+    assert!(fit_mixture(&data, None).is_err());
 }

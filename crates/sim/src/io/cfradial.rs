@@ -317,17 +317,17 @@ fn instrument(map: &VelocityMap) -> Values {
         "modulo"
     };
     let mut samples = Vec::with_capacity(rays);
+    let mut nyquist_m_s = Vec::with_capacity(rays);
     for ray in &map.rays {
+        let of_sweep_m_s = map.sweeps[ray.sweep].nyquist_velocity_m_s;
+        nyquist_m_s.push(of_sweep_m_s.unwrap_or(pulse.nyquist_velocity_m_s));
         samples.push(i32::try_from(ray.pulses).unwrap_or(i32::MAX));
     }
     vec![
         ("frequency", single(&[pulse.frequency_hz])),
         ("prt", single(&vec![pulse.prt_s; rays])),
         ("pulse_width", single(&vec![pulse.pulse_width_s; rays])),
-        (
-            "nyquist_velocity",
-            single(&vec![pulse.nyquist_velocity_m_s; rays]),
-        ),
+        ("nyquist_velocity", single(&nyquist_m_s)),
         ("nyquist_velocity:folding", Data::text(folding)),
         ("n_samples", Data::i32(samples)),
         ("antenna_transition", Data::i8(vec![0; rays])),

@@ -142,6 +142,8 @@ pub struct Sweep {
     pub fixed_angle_rad: f64,
     /// Its kind.
     pub mode: SweepMode,
+    /// Its Nyquist velocity, m/s, if it is not that of [`PulseInfo`].
+    pub nyquist_velocity_m_s: Option<f64>,
 }
 
 impl Sweep {
@@ -151,6 +153,7 @@ impl Sweep {
             tau,
             fixed_angle_rad: azimuth_rad,
             mode: SweepMode::Rhi,
+            nyquist_velocity_m_s: None,
         }
     }
 }

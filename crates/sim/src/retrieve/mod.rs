@@ -32,6 +32,7 @@ pub use realisations::{RetrievalRow, SceneRetrieval};
 pub use table::{
     PlaneTrack, RetrievedScan, flags, json, name, rows, track_of, track_table, tracks_of,
 };
+pub use truth::true_vortices;
 
 pub use crate::measure::response::SceneResponse;
 pub use crate::scene::RetrievalMethod as Method;

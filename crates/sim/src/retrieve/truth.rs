@@ -64,7 +64,7 @@ pub(super) fn is_there(truth: &VortexResult) -> bool {
 ///
 /// # Errors
 /// A simulated flow in which no vortices are found; what the wind refuses.
-pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResult; 2], Error> {
+pub fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResult; 2], Error> {
     match &plan.scene().flow {
         Flow::VortexPair(pair) => Ok([
             of_pair(plan, lines, pair, Side::Left)?,

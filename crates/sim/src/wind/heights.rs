@@ -297,13 +297,15 @@ fn wind_of(
         if j < count { along } else { along * heights[i] }
     });
     let velocities: Vec<f64> = used.iter().map(|cell| cell.velocity_m_s).collect();
-    let fold_m_s = used[0].fold_m_s;
-    let have_one_fold = used.iter().all(|cell| cell.fold_m_s == fold_m_s);
+    let folds_m_s: Vec<f64> = used
+        .iter()
+        .map(|cell| cell.fold_m_s.unwrap_or(f64::INFINITY))
+        .collect();
     let data = RadialVelocities {
         rows: rows.view(),
         velocity_m_s: &velocities,
         half_band_m_s,
-        fold_m_s: fold_m_s.filter(|_| have_one_fold),
+        folds_m_s: &folds_m_s,
     };
     let start_m_s = below_m_s.filter(|start| start.len() == count).map(|start| {
         let mut start = start.to_vec();

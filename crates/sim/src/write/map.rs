@@ -30,6 +30,7 @@ pub fn velocity_map(plan: &Plan, estimates: &VelocityEstimates) -> VelocityMap {
             tau: plan.wind.tau,
             fixed_angle_rad: *fixed_angle_rad,
             mode: *mode,
+            nyquist_velocity_m_s: None,
         });
     }
     let is_across = is_rhi

@@ -131,6 +131,7 @@ fn scene_of<'f>(file: &'f NetcdfFile, velocity: &VelocityVariable) -> Option<&'f
     file.global_text("scene")
         .or_else(|| file.text(&velocity.name, "scene"))
         .or_else(|| file.text(&velocity.name, "instrument"))
+        .filter(|text| !text.is_empty())
 }
 
 /// Distance of the first two gates, m.
