@@ -1,5 +1,8 @@
 """Each command gives what the program writes; arrays and datasets go in without files of one's own."""
 
+import gzip
+import json
+import struct
 import subprocess
 import sys
 
@@ -194,3 +197,50 @@ def test_a_large_module_is_loaded_in_little_time():
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True).stdout.split()
     # Timing never decides: what takes long is not imported.
     assert done[1] == "False"
+
+
+def test_predictions_are_scored_as_a_file_or_a_table(tmp_path):
+    data_set(tmp_path / "d")
+    table = {"flight": range(8), "scan": [0] * 8, "side": ["left"] * 7 + ["none"], "y_m": [11.0] * 7 + [None], "z_m": [50.0] * 8}
+    table["gamma_5_15_m2_s"] = [310.0] * 8
+    table["y_std_m"] = [1.0] * 7 + [float("nan")]
+    scores = wakescope.score(tmp_path / "d", table, split="train")
+    assert scores.sizes["index"] == len(scores.value) and scores.attrs["flights"] == 8
+    rms = scores.value[(scores.group == "all") & (scores.quantity == "gamma_5_15_m2_s") & (scores.statistic == "rms")]
+    assert rms.item() == pytest.approx(10.0)
+    lines = [",".join(table)] + [",".join("" if cell is None else str(cell) for cell in row) for row in zip(*table.values())]
+    (tmp_path / "p.csv").write_text("\n".join(lines) + "\n")
+    xarray.testing.assert_equal(scores, wakescope.score(tmp_path / "d", tmp_path / "p.csv", split=["train"]))
+    dataset = xarray.Dataset({name: ("index", list(cells)) for name, cells in table.items() if name != "y_m"})
+    dataset["y_m"] = ("index", [11.0] * 7 + [float("nan")])
+    xarray.testing.assert_equal(scores.value, wakescope.score(tmp_path / "d", dataset, split="train").value)
+    with pytest.raises(wakescope.WakescopeError, match="row 8, column side"):
+        wakescope.score(tmp_path / "d", {**table, "side": ["left"] * 7 + ["nothing"]}, split="train")
+
+
+def data_set(folder):
+    """Eight flights of one scan with one vortex, as a store of Zarr v3."""
+    nan = float("nan")
+    axes = ["flight", "scan", "vortex"]
+    arrays = {}
+    for name, kind, shape, values in [
+        *((name, "float64", [8], [value] * 8) for name, value in [("snr_middle", 5.0), ("dissipation", 1e-3), ("spacing", 40.0)]),
+        *((name, "uint8", [8], [value] * 8) for name, value in [("split", 0), ("site", 0), ("ready", 1)]),
+        ("wake_age", "float64", [8, 1], [1.0] * 8),
+        *((name, "float64", [8, 1, 2], [value, nan] * 8) for name, value in [("vortex_y", 10.0), ("vortex_z", 50.0), ("circulation_5_15", 300.0)]),
+        ("in_view", "uint8", [8, 1, 2], [1, 0] * 8),
+    ]:
+        size = 8 if kind == "float64" else 1
+        codec = {"name": "bytes", **({"configuration": {"endian": "little"}} if size > 1 else {})}
+        arrays[name] = {
+            "zarr_format": 3, "node_type": "array", "shape": shape, "data_type": kind,
+            "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": shape}},
+            "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
+            "fill_value": "NaN" if size > 1 else 0, "codecs": [codec, {"name": "gzip", "configuration": {"level": 1}}],
+            "attributes": {}, "dimension_names": axes[: len(shape)],
+        }  # fmt: skip
+        chunk = folder / "scans.zarr" / name / "c" / "/".join("0" * len(shape))
+        chunk.parent.mkdir(parents=True)
+        chunk.write_bytes(gzip.compress(struct.pack(f"<{len(values)}{'d' if size > 1 else 'B'}", *values)))
+    group = {"zarr_format": 3, "node_type": "group", "attributes": {"seed": 1}, "consolidated_metadata": {"kind": "inline", "metadata": arrays}}
+    (folder / "scans.zarr" / "zarr.json").write_text(json.dumps(group))

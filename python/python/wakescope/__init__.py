@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
 from . import _wakescope
-from ._result import Result, attributes, covariance
+from ._result import Result, attributes, covariance, write_table
 from ._wakescope import VERSION as __version__
 from ._wakescope import presets
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Progress", "Result", "Scene", "WakescopeError", "__version__", "accuracy", "bound", "budget", "case", "check", "detect",
-    "efficiency", "estimate", "flow", "presets", "retrieve", "run", "scene", "sweep", "wake", "wind",
+    "efficiency", "estimate", "flow", "presets", "retrieve", "run", "scene", "score", "sweep", "wake", "wind",
 ]  # fmt: skip
 
 Path_ = Union[str, "os.PathLike[str]"]
@@ -146,6 +146,17 @@ def sweep(scene: Scene, vary: Mapping[str, Any] | Sequence[str] = (), **options:
     if isinstance(vary, Mapping):
         vary = [f"{key}={_list(values)}" for key, values in vary.items()]
     return _command("sweep", scene, in_folder=True, vary=list(vary), **options)["results"]
+
+
+def score(data_set: Path_, predictions: Any, **options: Any) -> xarray.Dataset:
+    """Errors, coverage and detection of predictions for the scans of a data set, with 95 % intervals, by group, bin and quantity.
+
+    Predictions are a CSV file or a table: columns by their names, a `pandas.DataFrame` or an `xarray.Dataset` such as `retrieve` gives.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = predictions if isinstance(predictions, (str, os.PathLike)) else write_table(Path(folder) / "predictions.csv", predictions)
+        result = _command("score", data_set, path, **options)
+        return attributes(result["score"], result.answer)
 
 
 def accuracy(scene: Scene, within: float, **options: Any) -> xarray.Dataset:

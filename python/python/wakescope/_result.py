@@ -112,6 +112,19 @@ def numbers(name: str, cells: Sequence[str]) -> numpy.ndarray[Any, Any]:
     return numpy.array(cells, dtype=str)
 
 
+def write_table(path: Path, table: Any) -> Path:
+    """Writes a table as CSV: columns by their names, of a dataset those along the axis of its flights. What is missing is an empty cell."""
+    import numpy
+
+    names = [name for name in table.variables if table[name].dims == table["flight"].dims] if hasattr(table, "variables") else list(table)
+    columns = [numpy.asarray(table[name]).tolist() for name in names]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(names)
+        writer.writerows(["" if cell is None or cell != cell else cell for cell in row] for row in zip(*columns))
+    return path
+
+
 def attributes(found: xarray.Dataset, answer: Mapping[str, Any]) -> xarray.Dataset:
     """The same with the plain values of an answer as attributes."""
     plain = {name: int(value) if isinstance(value, bool) else value for name, value in answer.items() if isinstance(value, (str, int, float))}
