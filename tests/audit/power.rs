@@ -326,10 +326,11 @@ impl Ratios {
         let range_m: Vec<f64> = (0..count)
             .map(|i| near_m + (far_m - near_m) * i as f64 / (count - 1) as f64)
             .collect();
-        // Away from a focus the efficiency over the square of the range is smooth; near the lidar, where next to nothing of the pulse is, its
-        // quadrature is long. What the air returns may have kinks anywhere.
+        // Away from a focus and behind a whole aperture the efficiency over the square of the range is smooth; near the lidar, where next
+        // to nothing of the pulse is, its quadrature is long. What the air returns may have kinks anywhere.
         let is_focused = (0.5 * near_m..2.0 * far_m).contains(&s.f("telescope.focus_m"));
-        let is_dense = |r: f64| is_focused && r > 0.7 * scan.sample_m[0];
+        let is_obscured = s.f("telescope.obscuration_radius_m") > 0.0;
+        let is_dense = |r: f64| (is_focused || is_obscured) && r > 0.7 * scan.sample_m[0];
         let last = range_m.len() - 1;
         let known = range_m
             .iter()
