@@ -33,6 +33,11 @@ const BISTATIC: [(&str, &str); 3] = [
 const FRONT: [(&str, &str); 1] = [("detector.front_end.half_power_hz", "1e8")];
 const TRANSPORTED: [(&str, &str); 2] =
     [("flow.motion", "\"transported\""), ("flow.age_tau", "4.0")];
+const MEANDERING: [(&str, &str); 3] = [
+    ("flow.motion", "\"transported\""),
+    ("flow.age_tau", "4.0"),
+    ("added_flows", "[{ kind = \"eddies\" }]"),
+];
 const HAZE: [(&str, &str); 1] = [("atmosphere.aerosol.kind", "\"visibility\"")];
 const LAYER: [(&str, &str); 1] = [("atmosphere.aerosol.kind", "\"layer\"")];
 const HUFNAGEL: [(&str, &str); 3] = [
@@ -514,6 +519,13 @@ const KEYS: &[Key] = &[
     (
         "flow.rebound",
         &TRANSPORTED,
+        ["false", "true"],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.meander",
+        &MEANDERING,
         ["false", "true"],
         "map",
         "v_exact_m_s",

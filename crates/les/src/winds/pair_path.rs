@@ -1,5 +1,6 @@
 //! Path of a pair that decays and moves: point vortices with their images below the ground, their
-//! secondary vortices, buoyancy, and a wind that carries each vortex at its own place.
+//! secondary vortices, buoyancy, a wind that carries each vortex at its own place, and eddies that
+//! carry all of them as they move the middle of the pair.
 //!
 //! All in units of `b0`, `V0` and `t0 = b0/V0`; y from the middle of the pair. Runge-Kutta steps of
 //! fourth order with `t0/500`; between the stored times a cubic with the velocities at its ends.
@@ -8,6 +9,7 @@
 
 use super::decay::{DecayLaw, buoyancy_factor};
 use crate::error::{Error, check};
+use std::cell::Cell;
 
 /// Steps of a unit of time, and how many of them lie between two stored times.
 const STEPS_PER_TAU: f64 = 500.0;
@@ -101,15 +103,17 @@ pub(super) struct PairPath {
 pub(super) type ReducedVortex = (f64, [f64; 2]);
 
 impl PairPath {
-    /// The path of a pair released at `height` over a ground, or without one, until `last_tau`.
+    /// The path of a pair released at `height` over a ground, or without one, until `last_tau`;
+    /// eddies move all vortices as they move the middle of the pair.
     ///
     /// # Errors
-    /// As [`Transport::validated`]; what the wind refuses.
+    /// As [`Transport::validated`]; what wind and eddies refuse.
     pub(super) fn new(
         transport: Transport,
         height: f64,
         has_ground: bool,
         carrier: Carrier<'_>,
+        eddies: Option<Carrier<'_>>,
         last_tau: f64,
     ) -> Result<Self, Error> {
         let transport = transport.validated()?;
@@ -117,6 +121,8 @@ impl PairPath {
             transport,
             has_ground,
             carrier,
+            eddies,
+            last_eddies: Cell::new((f64::NAN, [0.0; 2])),
             birth_tau: [f64::INFINITY; 2],
             tau: 0.0,
             state: [-0.5, height, 0.5, height, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
@@ -200,11 +206,19 @@ fn circulations(transport: &Transport, birth_tau: &[f64; 2], tau: f64) -> [f64; 
     out
 }
 
+/// The middle between the left and the right vortex.
+fn middle(state: &State) -> [f64; 2] {
+    [0.5 * (state[0] + state[2]), 0.5 * (state[1] + state[3])]
+}
+
 /// The path while it is found.
 struct Integration<'a> {
     transport: Transport,
     has_ground: bool,
     carrier: Carrier<'a>,
+    eddies: Option<Carrier<'a>>,
+    /// Time and velocity of the last evaluation of the eddies.
+    last_eddies: Cell<(f64, [f64; 2])>,
     birth_tau: [f64; 2],
     tau: f64,
     state: State,
@@ -288,6 +302,7 @@ impl Integration<'_> {
     fn rate(&self, tau: f64, state: &State) -> Result<State, Error> {
         let circulation = circulations(&self.transport, &self.birth_tau, tau);
         let slowing = state[SLOWING].max(0.0);
+        let of_eddies = self.of_eddies(tau, state)?;
         let mut out = [0.0; 10];
         for own in 0..VORTICES {
             // Places before birth are none.
@@ -315,8 +330,8 @@ impl Integration<'_> {
                 out[DESCENT] -= 0.5 * velocity[1];
             }
             let wind = (self.carrier)(at, tau)?;
-            out[2 * own] = velocity[0] + wind[0];
-            out[2 * own + 1] = velocity[1] + wind[1];
+            out[2 * own] = velocity[0] + wind[0] + of_eddies[0];
+            out[2 * own + 1] = velocity[1] + wind[1] + of_eddies[1];
         }
         if slowing > 0.0 {
             let ratio = 0.5 * (circulation[1] - circulation[0]);
@@ -324,6 +339,21 @@ impl Integration<'_> {
             out[SLOWING] = -stiffness * state[DESCENT] / ratio;
         }
         Ok(out)
+    }
+
+    /// Velocity of the eddies at the middle of the pair. Stages of one time share it: their places
+    /// differ by less than a thousandth of the shortest of the long waves.
+    fn of_eddies(&self, tau: f64, state: &State) -> Result<[f64; 2], Error> {
+        let Some(eddies) = self.eddies else {
+            return Ok([0.0; 2]);
+        };
+        let (last_tau, last) = self.last_eddies.get();
+        if last_tau == tau {
+            return Ok(last);
+        }
+        let velocity = eddies(middle(state), tau)?;
+        self.last_eddies.set((tau, velocity));
+        Ok(velocity)
     }
 
     /// Velocity that a vortex and its image have at a place; the image alone at the vortex itself.

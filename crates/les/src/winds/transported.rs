@@ -6,7 +6,7 @@
 //! Check: the path against tables of an independent program; without decay and buoyancy the
 //! velocities of the inviscid pair.
 
-use super::pair_path::{PairPath, Transport};
+use super::pair_path::{Carrier, PairPath, Transport};
 use super::vortex::{Ground, Vortex, VortexPair, largest_gradient_per_s};
 use super::wind::Wind;
 use crate::error::{Error, check, check_lengths};
@@ -21,15 +21,17 @@ pub struct TransportedPair {
 
 impl TransportedPair {
     /// The pair from its release at time 0 until `last_tau`; `carrier` is the wind that carries
-    /// each vortex, at x = 0 and at times from the release; `pair.motion` does not matter.
+    /// each vortex, `eddies` those that move the whole pair as they move its middle, both at x = 0
+    /// and at times from the release; `pair.motion` does not matter.
     ///
     /// # Errors
     /// As [`VortexPair::validate`] and [`Transport::validated`]; [`Error::OutOfRange`] for a pair
-    /// without circulation; what the carrier refuses.
+    /// without circulation; what the winds refuse.
     pub fn new(
         pair: VortexPair,
         transport: Transport,
         carrier: Option<&dyn Wind>,
+        eddies: Option<&dyn Wind>,
         last_tau: f64,
     ) -> Result<Self, Error> {
         pair.validate()?;
@@ -37,23 +39,14 @@ impl TransportedPair {
             v > 0.0
         })?;
         check("last_tau", last_tau, "zero or positive", |v| v >= 0.0)?;
-        let wind = |[y, z]: [f64; 2], tau: f64| -> Result<[f64; 2], Error> {
-            let Some(carrier) = carrier else {
-                return Ok([0.0; 2]);
-            };
-            let y_m = pair.lateral_position_m + y * pair.spacing_m;
-            let mut out = [[0.0; 3]];
-            carrier.velocity_into(
-                &[[0.0, y_m, z * pair.spacing_m]],
-                pair.time_s(tau),
-                &mut out,
-            )?;
-            let scale_m_s = pair.descent_speed_m_s();
-            Ok([out[0][1] / scale_m_s, out[0][2] / scale_m_s])
-        };
+        let at_vortex = |at, tau| reduced_velocity(&pair, carrier, at, tau);
+        let at_middle = |at, tau| reduced_velocity(&pair, eddies, at, tau);
+        let of_eddies: Option<Carrier<'_>> = eddies.is_some().then_some(&at_middle);
         let height = pair.height_m / pair.spacing_m;
         let has_ground = pair.ground == Ground::Image;
-        let path = PairPath::new(transport, height, has_ground, &wind, last_tau)?;
+        let path = PairPath::new(
+            transport, height, has_ground, &at_vortex, of_eddies, last_tau,
+        )?;
         let mut found = Self {
             pair,
             path,
@@ -132,6 +125,24 @@ impl TransportedPair {
         )?;
         Ok(tau.clamp(0.0, last_tau))
     }
+}
+
+/// Velocity of a wind at a reduced place and time, in reduced units; 0 without a wind.
+fn reduced_velocity(
+    pair: &VortexPair,
+    wind: Option<&dyn Wind>,
+    [y, z]: [f64; 2],
+    tau: f64,
+) -> Result<[f64; 2], Error> {
+    let Some(wind) = wind else {
+        return Ok([0.0; 2]);
+    };
+    let y_m = pair.lateral_position_m + y * pair.spacing_m;
+    let at_m = [0.0, y_m, z * pair.spacing_m];
+    let mut out_m_s = [[0.0; 3]];
+    wind.velocity_into(&[at_m], pair.time_s(tau), &mut out_m_s)?;
+    let scale_m_s = pair.descent_speed_m_s();
+    Ok([out_m_s[0][1] / scale_m_s, out_m_s[0][2] / scale_m_s])
 }
 
 impl Wind for TransportedPair {

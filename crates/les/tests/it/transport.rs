@@ -2,7 +2,7 @@
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use wakescope_les::winds::decay::{self, DecayLaw};
-use wakescope_les::winds::{Linear, Transport, TransportedPair};
+use wakescope_les::winds::{Eddies, Linear, Mode, Transport, TransportedPair};
 use wakescope_les::{CirculationProfile, Error, Ground, Motion, VortexPair, Wind};
 
 /// Rows of a table without its head.
@@ -89,7 +89,7 @@ fn lifetimes_and_final_descents_are_those_of_the_table() {
             rebound: false,
         };
         let pair = unit_pair(0.0, Ground::None);
-        let path = TransportedPair::new(pair, transport, None, 40.0).unwrap();
+        let path = TransportedPair::new(pair, transport, None, None, 40.0).unwrap();
         let [left, right] = path.primary_vortices(40.0).unwrap();
         assert_relative_eq!(-left.height_m, row[6], max_relative = 1e-3);
         assert_eq!(left.height_m, right.height_m);
@@ -114,7 +114,7 @@ fn descent_speed_and_circulation_of_both_laws_are_those_of_the_table() {
             rebound: false,
         };
         let pair = unit_pair(0.0, Ground::None);
-        let path = TransportedPair::new(pair, transport, None, 11.0).unwrap();
+        let path = TransportedPair::new(pair, transport, None, None, 11.0).unwrap();
         let depth = |tau: f64| -path.primary_vortices(tau).unwrap()[1].height_m;
         for row in case {
             let row = numbers(&row[1..]);
@@ -142,7 +142,7 @@ fn centres_over_the_ground_are_those_of_the_table_to_tau_5() {
             ..NEITHER
         };
         let pair = unit_pair(first[0], Ground::Image);
-        let path = TransportedPair::new(pair, transport, carrier, 5.0).unwrap();
+        let path = TransportedPair::new(pair, transport, carrier, None, 5.0).unwrap();
         for row in case {
             let row = numbers(&row[1..]);
             let found = path.vortices(row[2]).unwrap();
@@ -163,7 +163,14 @@ fn between_stored_times_the_path_is_that_of_its_velocities() {
         ..NEITHER
     };
     let path = |last_tau: f64| {
-        TransportedPair::new(unit_pair(1.0, Ground::Image), transport, None, last_tau).unwrap()
+        TransportedPair::new(
+            unit_pair(1.0, Ground::Image),
+            transport,
+            None,
+            None,
+            last_tau,
+        )
+        .unwrap()
     };
     let whole = path(3.0);
     // A path that ends at a time has it as a stored one.
@@ -183,7 +190,7 @@ fn a_transported_pair_without_decay_makes_the_wind_of_the_inviscid_one() {
         ground: Ground::None,
         ..unit_pair(3.0, Ground::None)
     };
-    let path = TransportedPair::new(pair, NEITHER, None, 2.0).unwrap();
+    let path = TransportedPair::new(pair, NEITHER, None, None, 2.0).unwrap();
     let points_m = [[0.0, 0.3, 2.0], [5.0, -0.6, 1.4]];
     let mut found = [[0.0; 3]; 2];
     let mut expected = [[0.0; 3]; 2];
@@ -206,8 +213,8 @@ fn a_uniform_wind_carries_the_pair_and_decay_speaks_for_each_vortex() {
     };
     let pair = unit_pair(1.5, Ground::Image);
     let wind = Linear::uniform([7.0, 0.25, 0.0]).unwrap();
-    let still = TransportedPair::new(pair, transport, None, 4.0).unwrap();
-    let carried = TransportedPair::new(pair, transport, Some(&wind), 4.0).unwrap();
+    let still = TransportedPair::new(pair, transport, None, None, 4.0).unwrap();
+    let carried = TransportedPair::new(pair, transport, Some(&wind), None, 4.0).unwrap();
     for tau in [1.0, 2.5, 4.0] {
         let moved = carried.vortices(tau).unwrap();
         for (a, b) in moved.iter().zip(still.vortices(tau).unwrap()) {
@@ -225,10 +232,39 @@ fn a_uniform_wind_carries_the_pair_and_decay_speaks_for_each_vortex() {
 }
 
 #[test]
+fn long_eddies_move_all_vortices_as_the_integral_of_their_velocity_and_short_ones_do_not() {
+    let wave = |wavenumber_rad_m: f64| Mode {
+        wavenumber_rad_m: [wavenumber_rad_m, 0.0, 0.0],
+        real_m_s: [0.0, 0.3, -0.1],
+        frequency_rad_s: 0.7,
+        ..Mode::default()
+    };
+    let both = Eddies::new(vec![wave(1e-3), wave(3.5)]).unwrap();
+    // Waves longer than two spacings have fewer than pi radians a spacing.
+    let long = both.longer_than(2.0).unwrap();
+    assert_eq!(long.modes(), [wave(1e-3)]);
+    let pair = unit_pair(5.0, Ground::None);
+    let still = TransportedPair::new(pair, NEITHER, None, None, 4.0).unwrap();
+    let moved = TransportedPair::new(pair, NEITHER, None, Some(&long), 4.0).unwrap();
+    for tau in [0.5, 2.0, 4.0] {
+        let integral = f64::sin(0.7 * tau) / 0.7;
+        let there = moved.primary_vortices(tau).unwrap();
+        for (a, b) in there.iter().zip(still.primary_vortices(tau).unwrap()) {
+            let shift_m = a.lateral_position_m - b.lateral_position_m;
+            assert_abs_diff_eq!(shift_m, 0.3 * integral, epsilon = 1e-9);
+            let risen_m = a.height_m - b.height_m;
+            assert_abs_diff_eq!(risen_m, -0.1 * integral, epsilon = 1e-9);
+        }
+    }
+    let none = Eddies::new(Vec::new()).unwrap();
+    assert!(none.longer_than(0.0).is_err());
+}
+
+#[test]
 fn wrong_numbers_and_times_off_the_path_are_refused() {
     let pair = unit_pair(1.0, Ground::Image);
     let field = |pair: VortexPair, transport: Transport| match TransportedPair::new(
-        pair, transport, None, 1.0,
+        pair, transport, None, None, 1.0,
     )
     .err()
     {
@@ -250,7 +286,7 @@ fn wrong_numbers_and_times_off_the_path_are_refused() {
     assert_eq!(field(pair, negative), "n_star");
     assert_eq!(field(pair, dead), "lifetime_tau");
     assert_eq!(field(still, NEITHER), "circulation_m2_s");
-    let path = TransportedPair::new(pair, NEITHER, None, 1.0).unwrap();
+    let path = TransportedPair::new(pair, NEITHER, None, None, 1.0).unwrap();
     for time_s in [-0.01, 1.01, f64::NAN] {
         assert!(path.vortices(time_s).is_err(), "{time_s}");
     }

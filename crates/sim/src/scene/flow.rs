@@ -1,7 +1,7 @@
 //! The winds of a scene, that of `[flow]` and those that are added to it, and what they may say.
 //! Check: each limit is broken once.
 
-use super::air::{EddyField, WindProfile, check_eddies, check_wind_profile};
+use super::air::{EddyField, EddyRealisations, WindProfile, check_eddies, check_wind_profile};
 use crate::keys::{ABOVE_ZERO, Checker, Named, keys};
 use std::f64::consts::TAU;
 use wakescope_estimate::vortex_fit::CoreProfile;
@@ -63,6 +63,8 @@ keys! {
         buoyancy_per_s: f64 as omitted = 0.0 => 0.0..=0.1,
         /// Whether secondary vortices of the ground let a transported pair rebound.
         rebound: bool as omitted = false,
+        /// Whether eddies longer than two spacings move a transported pair as they move its middle.
+        meander: bool as omitted = false,
         /// The aircraft, if the wake is the older the farther it is behind it; absent: of one age everywhere.
         aircraft: Option<Aircraft> = None,
     }
@@ -329,6 +331,7 @@ impl VortexPair {
                     format!("{:?}", self.buoyancy_per_s),
                 ),
                 ("rebound", self.rebound, format!("{:?}", self.rebound)),
+                ("meander", self.meander, format!("{:?}", self.meander)),
             ];
             for (name, is_stated, value) in stated {
                 if is_stated {
@@ -362,6 +365,7 @@ impl super::Scene {
         if !self.flows().any(|(_, flow)| is_transported(flow)) {
             return;
         }
+        self.check_meander(c);
         let has_mean_wind = self.mean_winds().next().is_some();
         let mut first: Option<String> = None;
         for (at, flow) in self.flows() {
@@ -394,6 +398,22 @@ impl super::Scene {
                         format!("{none} beside {first}: one cross wind carries a transported pair");
                     c.refuse(&key, &value, allowed);
                 }
+            }
+        }
+    }
+
+    /// Eddies that move a pair have one path for all realisations.
+    fn check_meander(&self, c: &mut Checker<'_>) {
+        let eddies = self
+            .eddies()
+            .filter(|eddies| eddies.dissipation_m2_s3 > 0.0);
+        let has_one_path =
+            eddies.is_some_and(|eddies| eddies.realisations == EddyRealisations::One);
+        for (at, flow) in self.flows() {
+            if flow.pair().is_some_and(|pair| pair.meander) && !has_one_path {
+                let allowed = "absent without a flow of kind \"eddies\" with realisations = \"one\" and a dissipation above 0, \
+                               which moves the pair";
+                c.refuse(&format!("{at}.meander"), "true", allowed.to_owned());
             }
         }
     }

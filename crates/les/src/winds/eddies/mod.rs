@@ -108,6 +108,21 @@ impl Eddies {
         Self { evaluation, ..self }
     }
 
+    /// The modes of waves longer than this \[m\] alone.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a wavelength that is not positive.
+    pub fn longer_than(self, wavelength_m: f64) -> Result<Self, Error> {
+        check("wavelength_m", wavelength_m, "positive", |v| v > 0.0)?;
+        let largest_rad_m = std::f64::consts::TAU / wavelength_m;
+        let mut modes = self.modes;
+        modes.retain(|mode| {
+            let k = mode.wavenumber_rad_m;
+            dot(k, k) < largest_rad_m * largest_rad_m
+        });
+        Ok(Self { modes, ..self })
+    }
+
     /// The modes.
     pub fn modes(&self) -> &[Mode] {
         &self.modes
