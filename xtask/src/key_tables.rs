@@ -1,4 +1,4 @@
-//! The keys of scenes and cases as tables for the book, from their declarations (`keys!`) in the source of `sim`.
+//! The keys of scenes, plans and cases as tables for the book, from their declarations (`keys!`, `table!`) in the source of `sim`.
 
 use crate::workspace::root;
 use fixtures::failure::Failure;
@@ -33,7 +33,7 @@ struct Declarations {
 /// Sections that were written: the path of each table by its type.
 type Written = BTreeMap<String, String>;
 
-/// The page of all keys: scenes, then cases of flows.
+/// The page of all keys: scenes, plans of data sets, cases of flows.
 ///
 /// # Errors
 /// Fails if the source cannot be read.
@@ -47,7 +47,11 @@ pub(crate) fn page() -> Result<String, Failure> {
         }
     }
     let mut page = String::new();
-    for (title, of_type) in [("Scenes", "Scene"), ("Cases of flows", "FlowCase")] {
+    for (title, of_type) in [
+        ("Scenes", "Scene"),
+        ("Plans of data sets", "PlanKeys"),
+        ("Cases of flows", "FlowCase"),
+    ] {
         page += &format!("## {title}\n\n");
         known.write(&mut page, of_type, "", &mut Written::new());
     }
@@ -65,6 +69,15 @@ impl Declarations {
             let body = group(tokens.get(i + 2));
             match (word.to_string().as_str(), body) {
                 ("keys", Some(body)) if is_mark(tokens.get(i + 1), '!') => self.read_items(body),
+                // A table alone: its name, then its keys.
+                ("table", Some(body)) if is_mark(tokens.get(i + 1), '!') => {
+                    let named = documented(&body).1;
+                    if let [name, keys] = named
+                        && let Some(keys) = group(Some(keys))
+                    {
+                        self.tables.insert(name.to_string(), fields(&keys));
+                    }
+                }
                 ("foreign_choices", Some(body)) if is_mark(tokens.get(i + 1), '!') => {
                     for pair in body.chunks_exact(2) {
                         let variants = group(pair.get(1)).unwrap_or_default();
@@ -415,6 +428,19 @@ mod tests {
             "### `[flow]`",
             "| `\"calm\"` | | | | No wind. |",
             "| | `speed_m_s` | - | above 0 | Speed. |",
+        ] {
+            assert!(page.contains(row), "{row} in\n{page}");
+        }
+    }
+
+    #[test]
+    fn plans_have_their_keys_with_defaults_and_limits() {
+        let page = page().unwrap();
+        for row in [
+            "| `sites` | `8` | 1 to 1000 | Number of sites. |",
+            "| `empty` | `0.2` | 0.0 to 1.0 | Fraction of the flights without a wake. |",
+            "### `[split]`",
+            "### `[flight_rows]`",
         ] {
             assert!(page.contains(row), "{row} in\n{page}");
         }

@@ -49,13 +49,27 @@ pub enum Error {
         source: Box<Error>,
     },
     /// A case of a sweep was refused or could not be run.
-    #[error("case {case} of the sweep ({keys}): {source}{}", others_in_words(*.others))]
+    #[error("case {case} of the sweep ({keys}): {source}{}", more_in_words(*.others, "cases"))]
     Case {
         /// Number of the case, from 0.
         case: usize,
         /// Its keys and values.
         keys: String,
         /// Further cases that were refused.
+        others: usize,
+        /// What is wrong.
+        source: Box<Error>,
+    },
+    /// A flight of a data set was refused or could not be run.
+    #[error("flight {flight} of site {site} ({keys}): {source}{}", more_in_words(*.others, "flights"))]
+    Flight {
+        /// Number of the flight, from 0.
+        flight: usize,
+        /// Number of its site, from 0.
+        site: usize,
+        /// Its keys and values.
+        keys: String,
+        /// Further flights that were refused.
         others: usize,
         /// What is wrong.
         source: Box<Error>,
@@ -255,10 +269,10 @@ impl Error {
     }
 }
 
-fn others_in_words(others: usize) -> String {
+fn more_in_words(others: usize, what: &str) -> String {
     if others == 0 {
         String::new()
     } else {
-        format!("\nand {others} more cases are refused")
+        format!("\nand {others} more {what} are refused")
     }
 }

@@ -37,6 +37,7 @@
 //! | [`mod@run`] | running a plan |
 //! | [`mod@write`] | writing the results of a run |
 //! | [`accuracy`] | numerical error and run time, setting by setting |
+//! | [`dataset`] | data sets: many flights with exact truth, by a plan |
 //! | [`sweep`] | design studies: many scenes, their results, the Pareto front |
 //! | [`score`] | predictions against the truth of a data set |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
@@ -49,6 +50,7 @@
 
 pub mod accuracy;
 pub mod beams;
+pub mod dataset;
 pub mod detection;
 mod document;
 pub mod flow;

@@ -3,6 +3,7 @@
 //! Check: control groups and limits of the shell below the machine's memory win; text that is no number counts as no limit.
 
 use crate::quantities;
+use std::path::Path;
 
 /// Memory that can be had without swapping, bytes: what the system says is available, or less where a control group or a limit
 /// of the shell (`ulimit -v`) leaves less. `None` where the system does not say.
@@ -18,6 +19,21 @@ pub(crate) fn available_memory_bytes() -> Option<f64> {
     ];
     let known = limits.into_iter().flatten();
     known.map(|bytes| bytes.max(0.0)).reduce(f64::min)
+}
+
+/// Free bytes of the file system of a folder, which need not exist yet. `None` where the system does not say.
+#[cfg(unix)]
+pub(crate) fn free_bytes(folder: &Path) -> Option<f64> {
+    let absolute = std::path::absolute(folder).ok()?;
+    let there = absolute.ancestors().find(|ancestor| ancestor.exists())?;
+    let about = rustix::fs::statvfs(there).ok()?;
+    Some(about.f_bavail as f64 * about.f_frsize as f64)
+}
+
+/// Other systems are not asked.
+#[cfg(not(unix))]
+pub(crate) fn free_bytes(_: &Path) -> Option<f64> {
+    None
 }
 
 fn read(path: &str) -> Option<String> {

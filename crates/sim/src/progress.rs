@@ -32,6 +32,8 @@ crate::keys::choice! {
         Files = "files",
         /// Cases of a sweep.
         Cases = "cases",
+        /// Flights of a data set.
+        Flights = "flights",
     }
 }
 

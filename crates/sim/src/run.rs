@@ -146,9 +146,9 @@ fn signals_and_map<S: Sample + wakescope_signal::Sample>(
     };
     if plan.runs(Stage::Estimates) {
         let mut maps = Vec::new();
-        let seen = |_, velocity_m_s: &Array2<f64>| {
+        let seen = |map: &map::RealisationMap<'_>| {
             if plan.runs(Stage::Retrieval) {
-                maps.push(velocity_m_s.clone());
+                maps.push(map.velocity_m_s.clone());
             }
         };
         result.map = map::estimates(&[plan], scanner, observer, keep, seen)?.pop();

@@ -61,7 +61,7 @@ pub trait Statistic<S: Sample>: Sync {
 }
 
 /// Velocity from the mean of a [`Statistic`].
-pub trait Estimator: Sync {
+pub trait Estimator: Send + Sync {
     /// How many numbers the mean has.
     fn statistic_len(&self) -> usize;
     /// The velocity for the mean statistic `mean`.

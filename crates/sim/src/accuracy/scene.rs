@@ -198,7 +198,7 @@ impl<'a> Study<'a> {
         let optics_s = begun.elapsed().as_secs_f64();
         let begun = Instant::now();
         let scanner = Scanner::with(&plan, &self.common.efficiencies, self.observer)?;
-        let maps = map::of_plans(&[&plan], &scanner, self.observer, |_, _| ())?;
+        let maps = map::of_plans(&[&plan], &scanner, self.observer, |_| ())?;
         let mut sample = match maps.first() {
             Some(map) => Sample::new(&plan, &scanner, map, &self.metrics)?,
             None => Sample::default(),

@@ -5,7 +5,15 @@ use clap::Command;
 const GROUPS: [(&str, &[&str]); 4] = [
     (
         "Simulate",
-        &["run", "map", "signal", "efficiency", "flow", "wake"],
+        &[
+            "run",
+            "map",
+            "signal",
+            "efficiency",
+            "dataset",
+            "flow",
+            "wake",
+        ],
     ),
     (
         "Estimate and retrieve",

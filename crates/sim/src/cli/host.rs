@@ -135,7 +135,7 @@ impl Cli {
     }
 
     /// The text of a scene or a case: what the program that called has for its path, else that of the file.
-    fn text(&self, path: &Path) -> Result<Cow<'_, str>, SceneError> {
+    pub(super) fn text(&self, path: &Path) -> Result<Cow<'_, str>, SceneError> {
         if let Some(host) = &self.host
             && let Some(text) = host.texts.get(path)
         {

@@ -7,6 +7,7 @@ mod accuracy;
 mod args;
 mod bound;
 mod data_files;
+mod dataset;
 mod detect;
 mod estimate;
 mod flow;
@@ -162,6 +163,8 @@ enum Command {
         #[command(flatten)]
         folder: FolderArgs,
     },
+    /// Simulate a data set of scans with exact truth from a plan.
+    Dataset(dataset::DatasetArgs),
     /// Simulate a flow from a case file; write fields and checkpoints.
     Flow {
         /// Case file; --example prints one.
@@ -284,6 +287,7 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
             let cases = sweep::cases(scene.as_deref(), request, cli)?;
             sweep::sweep(cases.as_ref(), merge, out, *settings, cli)
         }
+        Command::Dataset(args) => dataset::dataset(args, cli),
         Command::Flow { case, run, example } => {
             flow::flow(example.as_deref(), case.as_deref(), run, cli)
         }

@@ -116,6 +116,18 @@ pub(super) const BESIDE_PRINT: &Idle = &[
 ];
 const PRINTED: &str = "a case file is printed, and nothing else is done";
 
+/// Beside the plan or the scene of a data set that is printed.
+pub(super) const BESIDE_PRINTED_PLAN: &Idle = &[
+    ("shard", NO_FLIGHT),
+    ("resume", NO_FLIGHT),
+    ("overwrite", NO_FLIGHT),
+    ("flights", NO_FLIGHT),
+];
+
+/// Beside a plan that is checked.
+pub(super) const BESIDE_CHECKED_PLAN: &Idle = &[("resume", NO_FLIGHT), ("overwrite", NO_FLIGHT)];
+const NO_FLIGHT: &str = "no flight is run";
+
 /// Without a folder or a file to write to.
 pub(super) const WITHOUT_OUTPUT: &Idle = &[
     ("overwrite", "nothing is written"),

@@ -106,7 +106,7 @@ fn problems(error: &Error) -> Vec<Value> {
         Error::Scene(SceneError::Unreadable { path, source }) | Error::Io { path, source, .. } => {
             vec![problem_object(path, None, &source.to_string())]
         }
-        Error::Case { source, .. } => problems(source),
+        Error::Case { source, .. } | Error::Flight { source, .. } => problems(source),
         Error::OfKey { key, source } => {
             let mut found = problems(source);
             for problem in &mut found {

@@ -298,6 +298,16 @@ impl Writer {
         let unique = self.files.fetch_add(1, Ordering::Relaxed);
         self.staging.put_file(unique, &self.root.join(key), content)
     }
+
+    /// Writes a file beside the folder of the group.
+    ///
+    /// # Errors
+    /// As [`Self::put`].
+    pub fn put_beside(&self, name: &str, content: &[u8]) -> OutputResult<()> {
+        let unique = self.files.fetch_add(1, Ordering::Relaxed);
+        let path = self.root.with_file_name(name);
+        self.staging.put_file(unique, &path, content)
+    }
 }
 
 /// Reads a chunk of `length` bytes; `None` where the file is absent.

@@ -95,6 +95,21 @@ impl VelocityEstimates {
     }
 }
 
+/// The map of one realisation.
+pub(crate) struct RealisationMap<'a> {
+    /// Index of its plan among those that are measured together.
+    pub(crate) plan: usize,
+    /// Radial velocities \[line, gate\], m/s.
+    pub(crate) velocity_m_s: &'a Array2<f64>,
+    /// Sums over the windows of its records.
+    pub(crate) scan: &'a Scan,
+    /// The gates, the lines one after the other, and the radius of the region of each gate of a line, m.
+    pub(crate) points: &'a [PolarPoint],
+    pub(crate) radius_m: &'a [f64],
+    /// Spectral density of the noise, A^2; NaN without noise.
+    pub(crate) noise_density_a2: f64,
+}
+
 /// Accumulates the errors of realisation after realisation.
 struct Mapper<'p, S> {
     estimator: MapEstimator<'p, S>,
@@ -240,14 +255,14 @@ fn truth(plan: &Plan, air: &ScanAir, shape: (usize, usize)) -> Result<VelocityEs
 }
 
 /// Runs the estimates of all realisations, of several plans that differ in their estimators alone: the signals of each are made
-/// once. The records of those that the files will have go to `kept`, too, piece after piece; `seen` is given the place of the plan
-/// and the velocities, m/s, of each map as it comes.
+/// once. The records of those that the files will have go to `kept`, too, piece after piece; `seen` is given each map as
+/// it comes.
 pub(crate) fn estimates<S: Sample + wakescope_signal::Sample>(
     plans: &[&Plan],
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
     mut kept: impl FnMut(ArrayView2<'_, S>),
-    seen: impl FnMut(usize, &Array2<f64>),
+    seen: impl FnMut(&RealisationMap<'_>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let kept_realisations = plans.first().map_or(0, |plan| plan.kept_realisations());
     if plans.iter().all(|plan| of_pulses(plan) == Pulses::Drawn) {
@@ -294,7 +309,7 @@ pub(crate) fn of_sums<S: Sample>(
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
     mut add: impl FnMut(usize, &mut [WindowSums<'_, S>]) -> Result<Clipped, Error>,
-    mut seen: impl FnMut(usize, &Array2<f64>),
+    mut seen: impl FnMut(&RealisationMap<'_>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let Some(plan) = plans.first() else {
         return Ok(Vec::new());
@@ -317,7 +332,15 @@ pub(crate) fn of_sums<S: Sample>(
         let scans: Vec<Scan> = sums.into_iter().map(ScanSums::finish).collect();
         let own = scanner.own_air(realisation)?;
         for (i, (mapper, scan)) in mappers.iter_mut().zip(&scans).enumerate() {
-            seen(i, &mapper.add(plans[i], scan, own.as_ref())?);
+            let velocity_m_s = mapper.add(plans[i], scan, own.as_ref())?;
+            seen(&RealisationMap {
+                plan: i,
+                velocity_m_s: &velocity_m_s,
+                scan,
+                points: &mapper.points,
+                radius_m: &mapper.map.radius_m,
+                noise_density_a2: mapper.estimator.tools.noise.density_a2,
+            });
         }
     }
     observer.end();
@@ -340,8 +363,8 @@ pub(crate) fn of_sums<S: Sample>(
 pub fn velocities(plan: &Plan, observer: &dyn Observer) -> Result<Vec<Array2<f64>>, Error> {
     let scanner = Scanner::new(plan, observer)?;
     let mut maps = Vec::with_capacity(plan.realisations());
-    of_plans(&[plan], &scanner, observer, |_, velocity_m_s| {
-        maps.push(velocity_m_s.clone())
+    of_plans(&[plan], &scanner, observer, |map| {
+        maps.push(map.velocity_m_s.clone())
     })?;
     Ok(maps)
 }
@@ -354,7 +377,7 @@ pub(crate) fn of_plans(
     plans: &[&Plan],
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
-    seen: impl FnMut(usize, &Array2<f64>),
+    seen: impl FnMut(&RealisationMap<'_>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let Some(first) = plans.first() else {
         return Ok(Vec::new());

@@ -9,7 +9,7 @@ mod fields;
 mod pair;
 mod planes;
 
-pub(crate) use pair::ScenePair;
+pub(crate) use pair::{ScenePair, mean_winds};
 pub use pair::{start_s, vortex_pair};
 
 use crate::Error;

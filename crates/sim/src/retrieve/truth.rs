@@ -54,7 +54,7 @@ fn absent(side: Side, time_s: f64) -> VortexResult {
 }
 
 /// Whether the air has this vortex.
-pub(super) fn is_there(truth: &VortexResult) -> bool {
+pub(crate) fn is_there(truth: &VortexResult) -> bool {
     truth.circulation_m2_s.value != 0.0
 }
 

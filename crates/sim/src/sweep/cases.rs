@@ -340,7 +340,7 @@ impl<'a> Grid<'a> {
         if !self.request.conditions.is_empty() {
             let whole = self.whole(&table)?;
             for condition in &self.request.conditions {
-                let holds = expression::holds(condition, Some(&|name| value_of(&whole, name)));
+                let holds = expression::holds(condition, Some(&|name| number_of_key(&whole, name)));
                 if !holds
                     .map_err(|why| refused("--where", Problem::new("condition", condition, why)))?
                 {
@@ -392,7 +392,7 @@ impl<'a> Grid<'a> {
 
 /// The value of a key by an expression of other keys.
 fn computed(column: &VaryingColumn, expression: &str, whole: &Value) -> Result<Value, String> {
-    let number = expression::value(expression, Some(&|name| value_of(whole, name)))?;
+    let number = expression::value(expression, Some(&|name| number_of_key(whole, name)))?;
     column
         .key
         .of_number(number)
@@ -543,7 +543,8 @@ fn cell_text(value: &Value) -> String {
     }
 }
 
-fn text_of(table: &Table) -> String {
+/// A table as TOML.
+pub(crate) fn text_of(table: &Table) -> String {
     toml::to_string(table)
         .unwrap_or_else(|e| unreachable!("a table that was read can be written: {e}"))
 }
@@ -578,7 +579,7 @@ pub(crate) fn set(table: &mut Table, path: &str, value: Value) {
 }
 
 /// The number of a name in an expression.
-fn value_of(whole: &Value, name: &str) -> Result<f64, String> {
+pub(crate) fn number_of_key(whole: &Value, name: &str) -> Result<f64, String> {
     let key = resolve(name, "").map_err(|problem| problem.to_string())?;
     match value_at(whole, &key.path) {
         Some(Value::Float(number)) => Ok(*number),

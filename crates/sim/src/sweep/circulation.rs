@@ -202,7 +202,7 @@ mod tests {
             &scanner,
             &Silent,
             |_| (),
-            |_, v_m_s| retrieval.add(v_m_s),
+            |map| retrieval.add(map.velocity_m_s),
         )
         .unwrap();
         let found = retrieval.result();

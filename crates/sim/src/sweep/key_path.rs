@@ -14,10 +14,10 @@ const WITHOUT_RESULT: [&str; 3] = ["format", "outputs", "site"];
 
 /// A key of the scene with what it takes.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct SceneKey {
+pub(crate) struct SceneKey {
     /// Its path, such as `pulse.shape.duration_s`.
-    pub(super) path: String,
-    pub(super) kind: Kind,
+    pub(crate) path: String,
+    pub(crate) kind: Kind,
 }
 
 fn leaves(keys: &[Key], path: &str, out: &mut Vec<SceneKey>) {
@@ -35,12 +35,30 @@ fn leaves(keys: &[Key], path: &str, out: &mut Vec<SceneKey>) {
                     leaves(inner, &here, out);
                 }
             }
-            _ if out.iter().any(|known| known.path == here) => {}
-            kind => out.push(SceneKey {
-                path: here,
-                kind: kind.clone(),
-            }),
+            kind => match out.iter_mut().find(|known| known.path == here) {
+                // A key of this name in several kinds of the table: reading the scene says whether it has the one in force.
+                Some(known) => join_kinds(&mut known.kind, kind),
+                None => out.push(SceneKey {
+                    path: here,
+                    kind: kind.clone(),
+                }),
+            },
         }
+    }
+}
+
+/// What a key may hold that is of one kind or of another: names of both, or else what can vary.
+fn join_kinds(known: &mut Kind, other: &Kind) {
+    match (known, other) {
+        (Kind::Choice(known), Kind::Choice(names)) => {
+            for name in names {
+                if !known.contains(name) {
+                    known.push(name);
+                }
+            }
+        }
+        (known @ Kind::List { .. }, other) => *known = other.clone(),
+        _ => {}
     }
 }
 
@@ -66,7 +84,7 @@ fn shortens(short: &str, path: &str) -> bool {
 }
 
 /// The key that a path names; `value` is what it was to be, for the message.
-pub(super) fn resolve(written: &str, value: &str) -> Result<SceneKey, Problem> {
+pub(crate) fn resolve(written: &str, value: &str) -> Result<SceneKey, Problem> {
     let refused = |allowed| Problem::new(written, value, allowed);
     let Some((index, key)) = added_flow(written) else {
         return varying_key(written).cloned().map_err(refused);
@@ -169,7 +187,7 @@ fn last_part(path: &str) -> &str {
 
 impl SceneKey {
     /// A text as a value of the key.
-    pub(super) fn read(&self, text: &str) -> Result<Value, Problem> {
+    pub(crate) fn read(&self, text: &str) -> Result<Value, Problem> {
         let text = text.trim();
         let word = text.trim_matches('"');
         let value = match &self.kind {
@@ -184,7 +202,7 @@ impl SceneKey {
     }
 
     /// A number as a value of the key; whole ones may be off by rounding.
-    pub(super) fn of_number(&self, number: f64) -> Result<Value, Problem> {
+    pub(crate) fn of_number(&self, number: f64) -> Result<Value, Problem> {
         self.number(number)
             .ok_or_else(|| self.refused(&format!("{number:?}")))
     }
@@ -325,6 +343,13 @@ mod tests {
             value("flow.mirror_y", "true").unwrap(),
             Value::Boolean(true)
         );
+        // The height of a pair, not the heights of a mean wind.
+        assert_eq!(value("flow.height_m", "60").unwrap(), Value::Float(60.0));
+        // The profile of a mean wind, not that of a vortex.
+        assert_eq!(
+            value("added_flows.0.profile", "power").unwrap(),
+            Value::String("power".into())
+        );
         assert_eq!(
             value("estimator.method.kind", "\"pulse_pair\"").unwrap(),
             Value::String("pulse_pair".into())
@@ -336,6 +361,7 @@ mod tests {
             ("pulse.energy_j", ""),
             ("estimator.method.kind", "pulse_par"),
             ("flow.mirror_y", "1"),
+            ("added_flows.0.profile", "flat"),
         ] {
             let problem = value(key, text).unwrap_err();
             assert!(

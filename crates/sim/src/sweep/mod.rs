@@ -12,7 +12,7 @@
 
 mod cases;
 mod circulation;
-mod expression;
+pub(crate) mod expression;
 pub mod front;
 mod key_path;
 #[cfg(feature = "plots")]
@@ -22,9 +22,10 @@ mod run;
 mod stored;
 mod tables;
 
-pub(crate) use cases::set;
 pub use cases::{Case, MOST_CASES, Request, Sweep};
+pub(crate) use cases::{number_of_key, set, text_of};
 pub(crate) use circulation::Retrieval;
+pub(crate) use key_path::{SceneKey, resolve};
 pub(crate) use run::Common;
 pub use run::{Settings, Shard, Summary, maps, run};
 pub use tables::merge;

@@ -79,8 +79,9 @@ pub(super) fn rows(
         )?);
     }
     let of_plans: Vec<&Plan> = plans.iter().collect();
-    let maps = map::of_plans(&of_plans, &scanner, observer, |i, velocity_m_s| {
-        let own = &mut all[i];
+    let maps = map::of_plans(&of_plans, &scanner, observer, |map| {
+        let own = &mut all[map.plan];
+        let velocity_m_s = map.velocity_m_s;
         own.velocity_m_s
             .extend(own.apart.iter().map(|cell| velocity_m_s[*cell]));
         own.retrieval

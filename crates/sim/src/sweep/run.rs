@@ -9,6 +9,7 @@ use super::tables;
 use crate::io::{Existing, OutputError, Table};
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::profile::EfficiencyMemo;
+use crate::measure::recorded::PredictedError;
 use crate::measure::scan::Scanner;
 use crate::memo::Memo;
 use crate::plan::wind::SceneWind;
@@ -229,7 +230,7 @@ pub fn maps(
             &plans.iter().collect::<Vec<_>>(),
             &scanner,
             observer,
-            |_, _| (),
+            |_| (),
         )?;
         drop(scanner);
         out.extend(indices.into_iter().zip(plans.into_iter().zip(found)));
@@ -239,10 +240,11 @@ pub fn maps(
 }
 
 /// Winds, plans of phase screens and efficiencies that scenes have in common, whenever they are measured.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Common {
     winds: Memo<SceneWind>,
     pub(crate) efficiencies: EfficiencyMemo,
+    pub(crate) predicted: Memo<PredictedError>,
 }
 
 impl Common {

@@ -220,9 +220,10 @@ fn scenes_and_cases_that_pages_show_are_good() {
     for (name, page) in pages() {
         for block in blocks(&page, "toml") {
             std::fs::write(temp.path().join("shown.toml"), block).unwrap();
-            let words: &[&str] = match block.contains("[case]") {
-                true => &["wake", "shown.toml", "--check", "--quiet"],
-                false => &["check", "shown.toml", "--quiet"],
+            let words: &[&str] = match (block.contains("[case]"), block.contains("[flight]")) {
+                (true, _) => &["wake", "shown.toml", "--check", "--quiet"],
+                (_, true) => &["dataset", "shown.toml", "--check", "--quiet"],
+                _ => &["check", "shown.toml", "--quiet"],
             };
             let out = wakescope(temp.path(), words);
             let told = String::from_utf8_lossy(&out.stderr);

@@ -12,6 +12,8 @@ mod book;
 #[cfg(feature = "cli")]
 mod cli;
 #[cfg(feature = "cli")]
+mod dataset;
+#[cfg(feature = "cli")]
 mod detection;
 #[cfg(feature = "cli")]
 mod estimate;

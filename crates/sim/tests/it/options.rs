@@ -56,6 +56,26 @@ svg = false
 png = false
 "#;
 
+/// A data set of two chunks.
+const DATASET: &str = r#"
+title = "two chunks"
+sites = 2
+flights_per_site = 8
+flights_per_chunk = 8
+[scene.detector.snr]
+reference = "fixed"
+snr_db = 10.0
+[scene.scan]
+elevation_min_rad = 0.1
+elevation_max_rad = 0.12
+elevation_step_rad = 5e-3
+range_min_m = 380.0
+range_max_m = 440.0
+pulses_per_line = 1
+[flight]
+"flow.height_m" = { uniform = [30.0, 60.0] }
+"#;
+
 const FLOW: &str = r#"
 [case]
 kind = "vortex_pair"
@@ -254,6 +274,10 @@ const KINDS: &[Kind] = &[
     ),
     all("score", "d d/p.csv"),
     all("score", "d d/p.csv --out out"),
+    all("dataset", "plan.toml --out out"),
+    all("dataset", "plan.toml --check"),
+    all("dataset", "plan.toml --scene 1"),
+    all("dataset", "--preset tiny --print"),
     all("accuracy", "tiny.toml --within 0.1 --out out"),
     all("flow", "flow.toml --out out"),
     all("flow", "flow.toml --check"),
@@ -289,6 +313,9 @@ fn value(command: &str, option: &str) -> Option<&'static [&'static str]> {
         ("bound", "out") => &["bound.csv"],
         ("flow" | "wake", "out") => &["flown"],
         (_, "out") => &["run"],
+        ("dataset", "scene") => &["1"],
+        ("dataset", "flights") => &["3"],
+        ("dataset", "preset") => &["tiny"],
         (_, "scene") => &["other.toml"],
         ("init", "preset") => &["halo_streamline"],
         ("accuracy" | "wake", "preset") => &["fine"],
@@ -403,6 +430,7 @@ fn inputs() -> TempDir {
     let write = |name: &str, content: &[u8]| fs::write(folder.join(name), content).unwrap();
     write("s.toml", SCENE.as_bytes());
     write("tiny.toml", TINY.as_bytes());
+    write("plan.toml", DATASET.as_bytes());
     write("flow.toml", FLOW.as_bytes());
     write("wake.toml", WAKE.as_bytes());
     let other = SCENE.replace("[estimator]", "[estimator]\nwindow_samples = 48");

@@ -16,10 +16,11 @@ mod tiles;
 pub use crate::io::Spectra;
 pub(crate) use lines::upward;
 pub use lines::{RayTable, ScanLines};
+pub(crate) use predicted::PredictedError;
 pub use predicted::predicted_table;
 pub use result::{MeasuredScan, measured_map};
-pub(crate) use spectra::spectra_of_samples;
 use spectra::spectra_of_scans;
+pub(crate) use spectra::{GateSpectra, spectra_of_samples};
 
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
@@ -332,7 +333,7 @@ fn of_run<S: Sample>(
         observer.advance(lines);
         Ok(Clipped::default())
     };
-    let maps = map::of_sums(&[plan], &scanner, observer, read, |_, _| ())?;
+    let maps = map::of_sums(&[plan], &scanner, observer, read, |_| ())?;
     Ok(maps.into_iter().map(Box::new).next().unwrap_or_default())
 }
 

@@ -18,7 +18,7 @@ use wakescope_estimate::map::{PolarPoint, ScanGeometry};
 const SNR_DB: std::ops::RangeInclusive<i32> = -40..=60;
 
 /// What pulses say against the signal-to-noise ratio, for the lines of a scan.
-pub(super) struct PredictedError {
+pub(crate) struct PredictedError {
     bias: Option<ExpectedBias>,
     places: ScanGeometry,
     snr_db: Vec<f64>,
@@ -28,7 +28,7 @@ pub(super) struct PredictedError {
 
 impl PredictedError {
     /// For regions of a scan of a scene that have at most the radius `largest_m`.
-    pub(super) fn new(plan: &Plan, places: ScanGeometry, largest_m: f64) -> Result<Self, Error> {
+    pub(crate) fn new(plan: &Plan, places: ScanGeometry, largest_m: f64) -> Result<Self, Error> {
         let is_noisy = plan.scene().detector.noise != NoiseModel::None;
         let (of_rays, count) = (
             RayInformation::new(plan, &[])?,
@@ -63,7 +63,7 @@ impl PredictedError {
     }
 
     /// The standard deviation of an estimate from `level` of the windows about a point, m/s; NaN where there is none, or no ratio.
-    pub(super) fn deviation_m_s(
+    pub(crate) fn deviation_m_s(
         &self,
         point: PolarPoint,
         radius_m: f64,

@@ -66,7 +66,7 @@ pub(crate) fn spectra_of_samples<S: Sample>(
 }
 
 /// Makes the spectra of gates.
-pub(super) struct GateSpectra {
+pub(crate) struct GateSpectra {
     spectrum: LagSpectrum,
     /// Indices of the frequencies in the band, by increasing velocity.
     bins: Vec<usize>,
@@ -79,18 +79,25 @@ impl GateSpectra {
     /// # Errors
     /// Fails if the numbers of the method are no correlogram of the whole window.
     pub(super) fn new(plan: &Plan, kind: SignalKind) -> Result<Self, Error> {
+        Self::with_points(plan, kind, plan.scene().estimator.padded_samples)
+    }
+
+    /// The same with another number of points of the transform.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn with_points(plan: &Plan, kind: SignalKind, padded: usize) -> Result<Self, Error> {
         let scene = plan.scene();
         // Models of windows without weighting take the first lags alone.
         let e = &scene.estimator;
         if e.few_lags().is_some() {
             let reason =
-                "--spectra needs the correlogram of the whole window, which this estimator.method does not make".into();
+                "spectra need the correlogram of the whole window, which this estimator.method does not make".into();
             return Err(Error::Key {
                 key: "estimator.method",
                 reason,
             });
         }
-        let padded = e.padded_samples;
         let sampling = scene.sampling()?;
         let spectrum = LagSpectrum::new(kind, e.window_samples, padded)?;
         let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
@@ -153,13 +160,18 @@ impl GateSpectra {
         Ok(())
     }
 
+    /// Velocity of each frequency of a spectrum, m/s, increasing.
+    pub(crate) fn velocity_m_s(&self) -> &[f64] {
+        &self.velocity_m_s
+    }
+
     /// Numbers of a spectrum.
     pub(super) fn len(&self) -> usize {
         self.bins.len()
     }
 
     /// The spectrum of the region of a point.
-    pub(super) fn density(
+    pub(crate) fn density(
         &self,
         scan: &Scan,
         point: PolarPoint,

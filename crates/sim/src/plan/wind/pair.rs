@@ -68,7 +68,7 @@ impl ScenePair {
             n_star,
             rebound: pair.rebound,
         };
-        let carrier = carrier(pair, file)?;
+        let carrier = mean_winds(pair.cross_wind_m_s, file)?;
         let eddies = meandering(pair, file)?;
         let eddies: Option<&dyn Wind> = eddies.as_ref().map(|eddies| eddies as &dyn Wind);
         let path = TransportedPair::new(released, transport, Some(&carrier), eddies, OLDEST_TAU)?;
@@ -165,10 +165,13 @@ impl ScenePair {
     }
 }
 
-/// The winds that carry a transported pair.
-fn carrier(pair: &VortexPair, file: &SceneFile) -> Result<Sum, Error> {
+/// The mean winds of a scene, which carry a transported pair: uniform ones and profiles, and the cross wind of the pair, m/s.
+///
+/// # Errors
+/// What a wind refuses; a checked scene gives none.
+pub(crate) fn mean_winds(cross_wind_m_s: f64, file: &SceneFile) -> Result<Sum, Error> {
     let scene = &file.content;
-    let mut winds: Vec<Box<dyn Wind>> = vec![Box::new(uniform_wind(pair.cross_wind_m_s, 0.0)?)];
+    let mut winds: Vec<Box<dyn Wind>> = vec![Box::new(uniform_wind(cross_wind_m_s, 0.0)?)];
     for flow in std::iter::once(&scene.flow).chain(&scene.added_flows) {
         match flow {
             Flow::Uniform {
