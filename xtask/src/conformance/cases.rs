@@ -93,13 +93,11 @@ impl Cases {
 
     /// The scene of a scan; a list of its lines is written to a folder that exists.
     pub(super) fn scene(&self, case: &ScanCase, folder: &Path) -> Result<SceneFile, Failure> {
-        let unknown = |name: &str| Failure::new(format!("cases.toml has no {name}"));
-        let pattern = self.pattern.get(&case.pattern);
-        let pattern = pattern.ok_or_else(|| unknown(&case.pattern))?;
-        let air = self.air.get(&case.air);
+        let pattern = entry(&self.pattern, &case.pattern)?;
+        let air = entry(&self.air, &case.air)?;
         let mut scene = self.scene.clone();
         lay_over(&mut scene, &pattern.scene);
-        lay_over(&mut scene, air.ok_or_else(|| unknown(&case.air))?);
+        lay_over(&mut scene, air);
         if let Some(snr_db) = case.snr_db {
             lay_over(
                 &mut scene,
@@ -115,6 +113,12 @@ impl Cases {
         let text = scene.to_string();
         Ok(SceneFile::parse(&text, &folder.join("scene.toml"))?)
     }
+}
+
+/// The part of that name.
+fn entry<'p, T>(parts: &'p BTreeMap<String, T>, name: &str) -> Result<&'p T, Failure> {
+    let part = parts.get(name);
+    part.ok_or_else(|| Failure::new(format!("cases.toml has no {name}")))
 }
 
 /// Lays a table over another: its keys take the place of those of the other, tables are joined.

@@ -288,10 +288,8 @@ fn vortices(scan: &Scan) -> Result<Value, Failure> {
 /// Variance of the velocities of each direction and gate over the rays, m^2/s^2: the mean square about the mean. Only of
 /// directions in turn, as those of six beams.
 fn variances(scan: &Scan, rays: &[Ray]) -> Value {
-    let pointing = scan.map.sweeps.iter();
-    let is_pointing = pointing
-        .clone()
-        .all(|sweep| sweep.mode == SweepMode::Pointing);
+    let mut sweeps = scan.map.sweeps.iter();
+    let is_pointing = sweeps.all(|sweep| sweep.mode == SweepMode::Pointing);
     let has_eddies = scan.plan.scene().added_flows.len() == 1;
     if !(is_pointing && has_eddies) {
         return Value::Null;
