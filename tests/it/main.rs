@@ -9,4 +9,5 @@ mod extremes;
 mod point_target;
 mod power;
 mod scan_errors;
+mod turbulence;
 mod uniform_wind;

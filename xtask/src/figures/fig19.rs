@@ -12,9 +12,11 @@ use wakescope_sim::scene::Flow;
 
 const FALSE_ALARM: f64 = 1e-2;
 /// The turbulence of the second background.
-const AIR: Turbulence = Turbulence {
-    deviation_m_s: 0.8,
-    length_m: 25.0,
+const DEVIATION_M_S: f64 = 0.8;
+const LENGTH_M: f64 = 25.0;
+const AIR: Turbulence = Turbulence::Exponential {
+    deviation_m_s: DEVIATION_M_S,
+    length_m: LENGTH_M,
 };
 /// Height that is scanned and half the length of the scan, m.
 const HEIGHT_M: f64 = 110.0;
@@ -107,8 +109,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let parameters = format!(
         "profile = \"{}\"\nrange_m = {ranges_m:?}\nline_spacing_m = {step_m}\nfalse_alarm = {FALSE_ALARM}\nturbulence = [{}, {}]\nscans_of_still_air = {scans}\nrate_counted = {rate}\n",
         context.profile.name(),
-        AIR.deviation_m_s,
-        AIR.length_m
+        DEVIATION_M_S,
+        LENGTH_M
     );
     let origin = context.provenance_of_formula(&parameters);
     let mut out = Rendered::new(&table(&cases), &picture(&cases), &origin)?;
@@ -116,8 +118,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         HEIGHT_M.to_string(),
         (2.0 * HALF_LENGTH_M).to_string(),
         FALSE_ALARM.to_string(),
-        AIR.deviation_m_s.to_string(),
-        AIR.length_m.to_string(),
+        DEVIATION_M_S.to_string(),
+        LENGTH_M.to_string(),
     ];
     out.claims = claims(&cases, alarmed, rate);
     Ok(out)

@@ -12,9 +12,10 @@ use ndarray::{Array2, ArrayView2, Axis};
 
 use crate::error::{Error, length, not_negative, positive};
 use crate::linalg::cholesky::forward;
-use crate::retrieval::{Turbulence, Whitening};
+use crate::retrieval::{ScanTurbulence, Turbulence, Whitening, gate_covariance};
 use crate::vortex_fit::map_fit::data::block_means;
 use crate::vortex_fit::{VelocityMap, WakeModel};
+use crate::wind_profile::GatePosition;
 
 /// Most cells that are kept: more tell little that is new about a wake of some ten metres, and whitening takes the cube.
 const MOST_CELLS: usize = 3000;
@@ -117,26 +118,61 @@ fn weight(map: &VelocityMap<'_>, line: usize, gate: usize) -> Option<f64> {
 pub(crate) enum Background {
     /// Independent noise of those standard deviations.
     Noise(Vec<f64>),
-    /// With turbulence.
-    Turbulent(Whitening),
+    /// With turbulence; with the variance of the noise of each cell \[m²/s²\] and the turbulence where this was found in a scan.
+    Turbulent(Whitening, Option<Box<(Vec<f64>, ScanTurbulence)>>),
 }
 
 impl Background {
+    /// Of gates whose weight has that standard deviation \[m\].
+    ///
     /// # Errors
     /// [`Error::OutOfRange`] for an impossible turbulence, [`Error::Linalg`] for a covariance without a factor.
-    pub(crate) fn new(cells: &Cells, turbulence: Option<&Turbulence>) -> Result<Self, Error> {
-        let cells = &cells.cells;
-        let Some(turbulence) = turbulence else {
-            return Ok(Self::Noise(
-                cells.iter().map(|cell| cell.deviation_m_s).collect(),
-            ));
+    pub(crate) fn new(
+        cells: &Cells,
+        turbulence: Option<&Turbulence>,
+        gate_std_m: f64,
+    ) -> Result<Self, Error> {
+        let Cells {
+            elevation_rad,
+            range_m,
+            cells,
+            ..
+        } = cells;
+        let mut found_in_scan = None;
+        let whitening = match turbulence {
+            None | Some(Turbulence::OfScan) => {
+                return Ok(Self::Noise(
+                    cells.iter().map(|cell| cell.deviation_m_s).collect(),
+                ));
+            }
+            Some(Turbulence::Exponential {
+                deviation_m_s,
+                length_m,
+            }) => {
+                not_negative("deviation_m_s of the turbulence", *deviation_m_s)?;
+                positive("length_m of the turbulence", *length_m)?;
+                let places: Vec<_> = cells
+                    .iter()
+                    .map(|cell| (cell.place_m, cell.deviation_m_s))
+                    .collect();
+                Whitening::exponential(&places, *deviation_m_s, *length_m)
+            }
+            Some(Turbulence::VonKarman(found)) => {
+                let mut gates = Vec::with_capacity(cells.len());
+                for cell in cells {
+                    let (sine, cosine) = elevation_rad[cell.line].sin_cos();
+                    let direction = [cosine, 0.0, sine];
+                    let range_m = range_m[cell.gate];
+                    gates.push(GatePosition::new(direction, range_m, 0.0, [0.0; 3]));
+                }
+                let sigmas_m_s: Vec<f64> = cells.iter().map(|cell| cell.deviation_m_s).collect();
+                let table = gate_covariance(&gates, gate_std_m)?;
+                let variances = sigmas_m_s.iter();
+                let noise_m2_s2 = variances.map(|sigma| found.noise_factor * sigma * sigma);
+                found_in_scan = Some(Box::new((noise_m2_s2.collect(), *found)));
+                Whitening::new(found.covariance_m2_s2(&table, &gates, &sigmas_m_s))
+            }
         };
-        not_negative("deviation_m_s of the turbulence", turbulence.deviation_m_s)?;
-        positive("length_m of the turbulence", turbulence.length_m)?;
-        let places: Vec<_> = cells
-            .iter()
-            .map(|cell| (cell.place_m, cell.deviation_m_s))
-            .collect();
         let reason = "is not positive definite: turbulence without noise in close cells has none";
         let order = cells.len();
         let singular = Error::Linalg {
@@ -144,9 +180,8 @@ impl Background {
             order,
             reason,
         };
-        Whitening::new(&places, turbulence)
-            .map(Self::Turbulent)
-            .ok_or(singular)
+        let whitening = whitening.ok_or(singular)?;
+        Ok(Self::Turbulent(whitening, found_in_scan))
     }
 
     /// Columns of numbers by cell, made white in place.
@@ -158,7 +193,7 @@ impl Background {
                     .zip(deviations)
                     .for_each(|(mut row, deviation)| row /= *deviation);
             }
-            Self::Turbulent(whitening) => forward(whitening.lower.view(), columns),
+            Self::Turbulent(whitening, _) => forward(whitening.lower.view(), columns),
         }
     }
 
@@ -169,8 +204,23 @@ impl Background {
                 .iter_mut()
                 .zip(deviations)
                 .for_each(|(x, deviation)| *x /= deviation),
-            Self::Turbulent(whitening) => whitening.whiten(numbers),
+            Self::Turbulent(whitening, _) => whitening.whiten(numbers),
         }
+    }
+
+    /// The turbulence that was found in a scan, and its part of the variance of the optimum contrast of a white pattern of unit length; none of
+    /// other backgrounds.
+    pub(crate) fn turbulent_part(&self, pattern: &[f64]) -> Option<(&ScanTurbulence, f64)> {
+        let Self::Turbulent(whitening, Some(known)) = self else {
+            return None;
+        };
+        let (noise_m2_s2, found) = &**known;
+        let contrast = whitening.contrast(pattern);
+        let mut of_noise = 0.0;
+        for (weight, noise_m2_s2) in contrast.iter().zip(noise_m2_s2) {
+            of_noise += weight * weight * noise_m2_s2;
+        }
+        Some((found, (1.0 - of_noise).max(0.0)))
     }
 }
 

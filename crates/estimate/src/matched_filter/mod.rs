@@ -30,7 +30,7 @@ pub(crate) struct MatchedFilter {
     pub(crate) model: WakeModel,
     kernel: RangeKernel,
     pub(crate) cells: Cells,
-    background: Background,
+    pub(crate) background: Background,
     /// Uniform wind and shear, white and orthonormal: cells by one or two.
     pub(crate) wind: Array2<f64>,
     /// What an anticlockwise vortex of unit circulation at each position shows, white, without wind: positions by cells.

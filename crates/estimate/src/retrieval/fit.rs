@@ -11,7 +11,9 @@ use crate::error::Error;
 use crate::retrieval::estimates::fit_estimates;
 use crate::retrieval::gate_means::fit_means;
 use crate::retrieval::secondary::with_secondary_vortices;
-use crate::retrieval::{Flag, RetrievalOptions, ScanFit, ScanMap, ScanResult, Velocities};
+use crate::retrieval::{
+    Flag, RetrievalOptions, ScanFit, ScanMap, ScanResult, Turbulence, Velocities,
+};
 use crate::vortex_fit::Sharing;
 
 /// Gates that share most of their window are skipped unless fewer velocities are left.
@@ -46,6 +48,7 @@ pub fn fit_scan(
     let mut rough = RetrievalOptions {
         core_radius_m: None,
         other_profile: false,
+        turbulence: options.turbulence.filter(|air| *air != Turbulence::OfScan),
         ..options.clone()
     };
     rough.free.core_radius = Sharing::Fixed;

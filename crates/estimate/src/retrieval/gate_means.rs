@@ -9,13 +9,17 @@ use crate::retrieval::aliases::{self, CALM, Unfolded};
 use crate::retrieval::alternatives::with_alternatives;
 use crate::retrieval::hypotheses::{End, Kind, Stage, least, rivals};
 use crate::retrieval::report::{OUTLIER, Report};
+use crate::retrieval::scan_turbulence::{Remainder, gate_covariance};
 use crate::retrieval::whitening::Whitening;
-use crate::retrieval::{Flag, Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
-
+use crate::retrieval::{
+    Covariance, Flag, Movement, RetrievalOptions, ScanMap, ScanResult, ScanTurbulence, Turbulence,
+};
+use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::SEARCHED;
 use crate::vortex_fit::tolerances::MINIMUM;
 use crate::vortex_fit::{Loss, Wake};
+use crate::wind_profile::GatePosition;
 
 /// Most velocities that are whitened, and that are fitted: blocks stand for more.
 const WHITENED: usize = 1500;
@@ -78,13 +82,16 @@ fn fit_unfolded(
     let found = search.ends_of(&starts);
     let likely = least(&found, search.squares.cells.len());
     all.thinned = bounded.is_some();
-    let whitening = options.turbulence.as_ref().map(|turbulence| {
-        likely
-            .iter()
-            .for_each(|end| reject(&mut all, turbulence, end));
-        whitening(&all, turbulence)
-    });
-    let whitening = whitening.transpose()?;
+    let whitening = match &options.turbulence {
+        None | Some(Turbulence::OfScan) => None,
+        Some(turbulence) => {
+            if let Some(end) = likely {
+                let air_m_s = deviation_m_s(turbulence);
+                reject(&mut all, end, |cell| cell.sigma_m_s.hypot(air_m_s));
+            }
+            Some(whitening(&all, turbulence, &about)?)
+        }
+    };
     all.squares.whitening = whitening.as_ref();
     let ends = ends_in_all(
         &all,
@@ -96,7 +103,94 @@ fn fit_unfolded(
     let cells = all.squares.cells.len();
     let (all, scale) = in_scale(all, least(&ends, cells));
     let ends = rivals(&ends, scale);
-    finished(all, &ends, scale, &about)
+    match options.turbulence {
+        Some(Turbulence::OfScan) => in_turbulence_of_scan(all, &ends, scale, &about),
+        _ => finished(all, &ends, scale, &about),
+    }
+}
+
+/// The result of rough ends of a fit to independent velocities, continued in the turbulence that the likely one leaves: generalised least
+/// squares, with the inverse of the information as covariance. Where no wake stands out of that turbulence, the reported one is what the wind
+/// leaves: the best of many wakes has taken some of it.
+fn in_turbulence_of_scan(
+    mut all: Stage<'_>,
+    ends: &[End],
+    scale: f64,
+    about: &Wake,
+) -> Result<(ScanResult, Option<(Wake, Movement)>), Error> {
+    let Some(likely) = least(ends, all.squares.cells.len()) else {
+        return finished(all, ends, scale, about);
+    };
+    reject(&mut all, likely, |cell| scale * cell.sigma_m_s);
+    let remainder = remainder_of(&all, likely);
+    let table = gate_covariance(&remainder.gates, all.options.gate.std_m())?;
+    let Some(turbulence) = remainder.turbulence(&table)? else {
+        return finished(all, ends, scale, about);
+    };
+    let whitening = remainder.whitening(&turbulence, &table);
+    let whitening = whitening.ok_or(singular(remainder.gates.len()))?;
+    let options = RetrievalOptions {
+        loss: Loss::Squares,
+        covariance: Covariance::Model,
+        ..all.options.clone()
+    };
+    let mut stage = Stage {
+        options: &options,
+        ..all.clone()
+    };
+    stage.squares.loss = options.loss;
+    stage.squares.whitening = Some(&whitening);
+    let ends = stage.again(ends);
+    let cells = stage.squares.cells.len();
+    let (stage, scale) = in_scale(stage, least(&ends, cells));
+    let (mut result, better) = finished(stage, &rivals(&ends, scale), scale, about)?;
+    result.turbulence = Some(turbulence);
+    if result.vortices.is_empty() {
+        let wind = all.wind(about)?;
+        let calm = remainder_of(&all, &wind).turbulence(&table)?;
+        result.turbulence = calm.map(|found| ScanTurbulence {
+            is_beside_wake: false,
+            ..found
+        });
+    }
+    Ok((result, better))
+}
+
+/// What an end leaves of the velocities of a stage.
+fn remainder_of(stage: &Stage<'_>, end: &End) -> Remainder {
+    let rows = stage.squares.rows(&end.wake.to_array(), &end.groups);
+    let cells = stage.squares.cells.iter();
+    let noise_std_m_s = cells.map(|cell| cell.sigma_m_s).collect();
+    Remainder::new(gate_positions(stage, &end.wake), rows, noise_std_m_s)
+}
+
+/// Where the gates of a stage are in air that the wind of a wake carries along, in the plane of the scan.
+fn gate_positions(stage: &Stage<'_>, wake: &Wake) -> Vec<GatePosition> {
+    let carried_m_s = [mean_wind_m_s(stage, wake), 0.0, 0.0];
+    let mut gates = Vec::with_capacity(stage.squares.cells.len());
+    for cell in &stage.squares.cells {
+        let (sine, cosine) = stage.map.elevation_rad[cell.line].sin_cos();
+        let time_s = match stage.map.has_times() {
+            true => stage.map.time_s[cell.line],
+            false => 0.0,
+        };
+        let range_m = stage.map.range_m[cell.gate];
+        let direction = [cosine, 0.0, sine];
+        gates.push(GatePosition::new(direction, range_m, time_s, carried_m_s));
+    }
+    gates
+}
+
+/// Lateral wind of a wake at the mean height of the cells of a stage \[m/s\].
+fn mean_wind_m_s(stage: &Stage<'_>, wake: &Wake) -> f64 {
+    let mut height_m = 0.0;
+    for cell in &stage.squares.cells {
+        let range_m = stage.map.range_m[cell.gate];
+        let elevation_rad = stage.map.elevation_rad[cell.line];
+        height_m += stage.gates.model.position_m(range_m, elevation_rad).1;
+    }
+    let [.., wind_m_s, shear_per_s] = wake.to_array();
+    wind_m_s + shear_per_s * height_m / stage.squares.cells.len().max(1) as f64
 }
 
 /// The result of rough ends, followed to their end with vortices that move or stand still, and a wake in another wind that explains the
@@ -215,32 +309,62 @@ fn in_scale<'a>(mut stage: Stage<'a>, likely: Option<&End>) -> (Stage<'a>, f64) 
     (stage, scale)
 }
 
-/// What makes the velocities of a stage white.
-fn whitening(stage: &Stage<'_>, turbulence: &Turbulence) -> Result<Whitening, Error> {
-    let mut places = Vec::with_capacity(stage.squares.cells.len());
-    for cell in &stage.squares.cells {
-        let range_m = stage.map.range_m[cell.gate];
-        let elevation_rad = stage.map.elevation_rad[cell.line];
-        let position_m = stage.gates.model.position_m(range_m, elevation_rad);
-        places.push((position_m, cell.sigma_m_s));
+/// Standard deviation of the velocities of the air in given turbulence \[m/s\].
+fn deviation_m_s(turbulence: &Turbulence) -> f64 {
+    match turbulence {
+        Turbulence::Exponential { deviation_m_s, .. } => *deviation_m_s,
+        Turbulence::VonKarman(found) => found.variance_m2_s2().sqrt(),
+        Turbulence::OfScan => 0.0,
     }
-    Whitening::new(&places, turbulence).ok_or(Error::Linalg {
-        what: "covariance of the velocities",
-        order: places.len(),
-        reason: "is singular to working precision: state larger deviations of the velocities",
-    })
 }
 
-/// Takes away velocities far off a first fit, which whitening would spread over their neighbours.
-fn reject(stage: &mut Stage<'_>, turbulence: &Turbulence, end: &End) {
+/// What makes the velocities of a stage white in given turbulence and in the wind of a wake.
+fn whitening(stage: &Stage<'_>, turbulence: &Turbulence, about: &Wake) -> Result<Whitening, Error> {
+    let cells = &stage.squares.cells;
+    let whitening = match turbulence {
+        Turbulence::Exponential {
+            deviation_m_s,
+            length_m,
+        } => {
+            let mut places = Vec::with_capacity(cells.len());
+            for cell in cells {
+                let range_m = stage.map.range_m[cell.gate];
+                let elevation_rad = stage.map.elevation_rad[cell.line];
+                let position_m = stage.gates.model.position_m(range_m, elevation_rad);
+                places.push((position_m, cell.sigma_m_s));
+            }
+            Whitening::exponential(&places, *deviation_m_s, *length_m)
+        }
+        Turbulence::VonKarman(found) => {
+            let sigmas_m_s: Vec<f64> = cells.iter().map(|cell| cell.sigma_m_s).collect();
+            let gates = gate_positions(stage, about);
+            let table = gate_covariance(&gates, stage.options.gate.std_m())?;
+            Whitening::new(found.covariance_m2_s2(&table, &gates, &sigmas_m_s))
+        }
+        Turbulence::OfScan => None,
+    };
+    whitening.ok_or(singular(cells.len()))
+}
+
+fn singular(order: usize) -> Error {
+    Error::Linalg {
+        what: "covariance of the velocities",
+        order,
+        reason: "is singular to working precision: state larger deviations of the velocities",
+    }
+}
+
+/// Takes away velocities that are farther off a first fit than [`OUTLIER`] times a deviation \[m/s\]: whitening would spread them over their
+/// neighbours.
+fn reject(stage: &mut Stage<'_>, end: &End, deviation_m_s: impl Fn(&Cell) -> f64) {
     let residuals = stage.squares.rows(&end.wake.to_array(), &[]).residuals;
     let mut residuals = residuals.iter();
     let before = stage.squares.cells.len();
     stage.squares.cells.retain(|cell| {
-        let deviation_m_s = cell.sigma_m_s.hypot(turbulence.deviation_m_s);
+        let allowed_m_s = OUTLIER * deviation_m_s(cell);
         residuals
             .next()
-            .is_none_or(|r| r.abs() * cell.sigma_m_s <= OUTLIER * deviation_m_s)
+            .is_none_or(|r| r.abs() * cell.sigma_m_s <= allowed_m_s)
     });
     stage.rejected = before - stage.squares.cells.len();
 }

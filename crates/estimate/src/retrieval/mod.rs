@@ -9,6 +9,7 @@
 //! | `aliases` | winds beyond the Nyquist interval |
 //! | `plausible` | what the vortices of an aircraft can be |
 //! | `gates`, `whitening` | what a velocity is of the air; correlated velocities |
+//! | `scan_turbulence` | turbulence that a scan shows beside its wake |
 //! | `secondary` | the fit again with secondary vortices, if the scan shows them |
 //! | `radial_velocity`, `envelope` | the methods of the literature beside it, with their errors |
 //! | `track` | many scans: filter and smoother |
@@ -42,6 +43,7 @@ mod radial_velocity;
 mod report;
 mod result;
 mod scan_map;
+pub(crate) mod scan_turbulence;
 mod secondary;
 mod track;
 mod velocities;
@@ -56,6 +58,8 @@ pub use plausible::without_implausible_vortices;
 pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, ScanFit, ScanResult, Side, VortexResult};
 pub use scan_map::ScanMap;
+pub use scan_turbulence::ScanTurbulence;
+pub(crate) use scan_turbulence::gate_covariance;
 pub use track::{Track, TrackPoint, TrackedVortex, track};
 pub use velocities::{ScanEstimator, Velocities};
 pub(crate) use whitening::Whitening;

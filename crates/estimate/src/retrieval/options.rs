@@ -1,6 +1,7 @@
 //! How a scan is retrieved.
 
 use crate::error::{Error, not_negative, positive};
+use crate::retrieval::ScanTurbulence;
 use crate::vortex_fit::{
     CorePrior, FreeParameters, Loss, MapFitOptions, RangeKernel, Secondary, Vortex, Wake,
     WakeModel, WindFit,
@@ -64,13 +65,34 @@ impl Gate {
     }
 }
 
-/// Correlated velocities beside the noise of each: C = deviation^2 exp(-distance / length).
+/// Correlated velocities beside the noise of each.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Turbulence {
-    /// Standard deviation of the correlated part \[m/s\].
-    pub deviation_m_s: f64,
-    /// Distance after which the correlation has fallen to 1/e \[m\].
-    pub length_m: f64,
+pub enum Turbulence {
+    /// C = deviation^2 exp(-distance / length).
+    Exponential {
+        /// Standard deviation of the correlated part \[m/s\].
+        deviation_m_s: f64,
+        /// Distance after which the correlation has fallen to 1/e \[m\].
+        length_m: f64,
+    },
+    /// Isotropic turbulence with the spectrum of von Karman, as a scan showed it.
+    VonKarman(ScanTurbulence),
+    /// As [`Turbulence::VonKarman`], found in the scan itself.
+    OfScan,
+}
+
+impl Turbulence {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        let Self::Exponential {
+            deviation_m_s,
+            length_m,
+        } = *self
+        else {
+            return Ok(());
+        };
+        positive("deviation_m_s of the turbulence", deviation_m_s)?;
+        positive("length_m of the turbulence", length_m)
+    }
 }
 
 /// How the covariance of a fit is made.
@@ -143,10 +165,8 @@ impl RetrievalOptions {
     pub const MOVES: f64 = 9.0;
 
     pub(crate) fn validate(&self) -> Result<(), Error> {
-        if let Some(turbulence) = self.turbulence {
-            positive("deviation_m_s of the turbulence", turbulence.deviation_m_s)?;
-            positive("length_m of the turbulence", turbulence.length_m)?;
-        }
+        self.turbulence
+            .map_or(Ok(()), |turbulence| turbulence.validate())?;
         if let Loss::Cauchy { width } = self.loss {
             positive("width of the loss", width)?;
         }

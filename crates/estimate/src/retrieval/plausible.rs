@@ -157,6 +157,7 @@ mod tests {
             statistic: 100.0,
             threshold: 22.0,
             flags: vec![Flag::OneVortex, Flag::PoorFit],
+            turbulence: None,
             tops: vec![],
         }
     }

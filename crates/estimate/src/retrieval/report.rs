@@ -182,6 +182,7 @@ impl<'a> Report<'a> {
             vortices,
             covariance,
             tops,
+            turbulence: None,
         }
     }
 

@@ -3,7 +3,7 @@
 use ndarray::Array2;
 
 use crate::Measured;
-use crate::retrieval::ScanMap;
+use crate::retrieval::{ScanMap, ScanTurbulence};
 use crate::vortex_fit::map_fit::data::nearest_index;
 use crate::vortex_fit::tolerances::{CERTAIN_SIGMAS, COMPETES};
 use crate::vortex_fit::wake::motion::Motion;
@@ -237,6 +237,8 @@ pub struct ScanResult {
     pub flags: Vec<Flag>,
     /// All ends of the fit that are not the same, the best first.
     pub tops: Vec<Top>,
+    /// The turbulence that was found in the scan and taken into account, if that was requested.
+    pub turbulence: Option<ScanTurbulence>,
 }
 
 impl ScanResult {

@@ -531,6 +531,7 @@ mod tests {
             threshold: 40.0,
             flags: vec![],
             tops: vec![],
+            turbulence: None,
         }
     }
 

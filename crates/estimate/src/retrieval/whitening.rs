@@ -5,7 +5,6 @@
 use ndarray::Array2;
 
 use crate::linalg::cholesky::{cholesky, forward_one};
-use crate::retrieval::Turbulence;
 
 /// Lower factor L of C = L L^T.
 #[derive(Debug, Clone)]
@@ -14,24 +13,44 @@ pub(crate) struct Whitening {
 }
 
 impl Whitening {
-    /// Of cells at (lateral position, height) with their standard deviations; nothing if C is singular to working precision.
-    pub(crate) fn new(cells: &[((f64, f64), f64)], turbulence: &Turbulence) -> Option<Self> {
-        let variance = turbulence.deviation_m_s.powi(2);
+    /// Of cells at (lateral position, height) with their standard deviations in turbulence of that deviation \[m/s\] and length \[m\]; nothing
+    /// if C is singular to working precision.
+    pub(crate) fn exponential(
+        cells: &[((f64, f64), f64)],
+        deviation_m_s: f64,
+        length_m: f64,
+    ) -> Option<Self> {
+        let variance = deviation_m_s.powi(2);
         let covariance = Array2::from_shape_fn((cells.len(), cells.len()), |(i, k)| {
             let ((ya, za), sigma) = cells[i];
             let ((yb, zb), _) = cells[k];
             match k.cmp(&i) {
-                std::cmp::Ordering::Less => {
-                    variance * (-(ya - yb).hypot(za - zb) / turbulence.length_m).exp()
-                }
+                std::cmp::Ordering::Less => variance * (-(ya - yb).hypot(za - zb) / length_m).exp(),
                 std::cmp::Ordering::Equal => variance + sigma * sigma,
                 // the lower triangle says all
                 std::cmp::Ordering::Greater => 0.0,
             }
         });
-        Some(Self {
-            lower: cholesky(covariance)?,
-        })
+        Self::new(covariance)
+    }
+
+    /// Of a covariance, whose lower triangle is read; nothing if it is singular to working precision.
+    pub(crate) fn new(covariance: Array2<f64>) -> Option<Self> {
+        cholesky(covariance).map(|lower| Self { lower })
+    }
+
+    /// L^-T x: weights of the velocities in the product of x with white ones.
+    pub(crate) fn contrast(&self, x: &[f64]) -> Vec<f64> {
+        let mut rest = x.to_vec();
+        for i in (0..rest.len()).rev() {
+            let row = self.lower.row(i);
+            rest[i] /= row[i];
+            let own = rest[i];
+            for j in 0..i {
+                rest[j] -= row[j] * own;
+            }
+        }
+        rest
     }
 
     /// Replaces x by L^-1 x.
@@ -49,10 +68,6 @@ mod tests {
 
     #[test]
     fn the_factor_times_its_transpose_is_the_covariance() {
-        let turbulence = Turbulence {
-            deviation_m_s: 1.2,
-            length_m: 25.0,
-        };
         let cells: Vec<((f64, f64), f64)> = (0..130)
             .map(|i| {
                 (
@@ -61,7 +76,7 @@ mod tests {
                 )
             })
             .collect();
-        let factor = Whitening::new(&cells, &turbulence).unwrap();
+        let factor = Whitening::exponential(&cells, 1.2, 25.0).unwrap();
         for (i, k) in [(0, 0), (7, 3), (100, 60), (129, 129)] {
             let (((ya, za), sigma), ((yb, zb), _)) = (cells[i], cells[k]);
             let own = if i == k { sigma * sigma } else { 0.0 };
@@ -78,7 +93,16 @@ mod tests {
                 .enumerate()
                 .all(|(i, x)| (x - f64::from(u8::from(i == 60))).abs() < 1e-12)
         );
+        // L^T times the weights of a contrast is the pattern
+        let pattern: Vec<f64> = (0..130).map(|i| f64::from(i % 11) - 5.0).collect();
+        let weights = factor.contrast(&pattern);
+        for j in [0, 64, 129] {
+            let product = factor.lower.column(j).dot(&ndarray::aview1(&weights));
+            assert!((product - pattern[j]).abs() < 1e-12, "{j}");
+        }
         // two cells at one place without noise of their own
-        assert!(Whitening::new(&[((1.0, 1.0), 0.0), ((1.0, 1.0), 0.0)], &turbulence).is_none());
+        assert!(
+            Whitening::exponential(&[((1.0, 1.0), 0.0), ((1.0, 1.0), 0.0)], 1.2, 25.0).is_none()
+        );
     }
 }

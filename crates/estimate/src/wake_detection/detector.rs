@@ -40,7 +40,7 @@ pub struct WakeDetector {
 /// The test of one scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WakeStatistic {
-    /// T: what a wake explains of the best wind's chi-square.
+    /// T: what a wake explains of the best wind's chi-square; where the turbulence was found in the scan, as if it were known.
     pub value: f64,
     /// Sum of squares over the variances that is left of the scan after the best wind, over its degrees of freedom.
     pub wind_chi2_per_dof: f64,
@@ -85,7 +85,7 @@ impl WakeDetector {
         }
         gate.validate(&map.range_m)?;
         let cells = Cells::new(&map.view(), model);
-        let background = Background::new(&cells, options.turbulence.as_ref())?;
+        let background = Background::new(&cells, options.turbulence.as_ref(), gate.std_m())?;
         let kernel = kernel(gate)?;
         let bank = Bank::new(&cells, model, kernel.width_m(), options);
         not_empty("list of wakes that fit into the scan", bank.templates.len())?;
@@ -149,13 +149,31 @@ impl WakeDetector {
         }
         let [along, across] = self.neighbour_correlation(&left, template);
         Ok(WakeStatistic {
-            value,
+            value: self.of_known_background(value, template, length),
             neighbour_correlation: (along.0, across.0),
             correlation_error: (along.1, across.1),
             wind_chi2_per_dof: rest / wind_dof as f64,
             wake_chi2_per_dof: (rest - value) / wake_dof as f64,
             wake: self.wake(template, value.sqrt() * length),
             circulation_std_m2_s: length,
+        })
+    }
+
+    /// The statistic of a wake of the bank as if the background were known.
+    fn of_known_background(&self, value: f64, template: &Template, length: f64) -> f64 {
+        let Background::Turbulent(_, Some(_)) = self.filter.background else {
+            return value;
+        };
+        let mut pattern = vec![0.0; self.filter.cells.cells.len()];
+        for (place, sense) in template.iter().zip([-1.0, 1.0]) {
+            let Some(place) = place else { continue };
+            for (sum, shape) in pattern.iter_mut().zip(self.filter.shapes.row(*place)) {
+                *sum += sense * length * shape;
+            }
+        }
+        let found = self.filter.background.turbulent_part(&pattern);
+        found.map_or(value, |(turbulence, part)| {
+            turbulence.chi2_of_known_variance(value, part)
         })
     }
 

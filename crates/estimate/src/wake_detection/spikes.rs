@@ -21,7 +21,13 @@ pub fn without_spikes(map: &ScanMap, turbulence: Option<&Turbulence>) -> (ScanMa
         off_neighbours(&kept.velocity_m_s, at)
     });
     let of_all = robust_scale(off.iter().copied().filter(|x| x.is_finite()));
-    let air_m_s = turbulence.map_or(0.0, |turbulence| turbulence.deviation_m_s);
+    let air_m_s = match turbulence {
+        Some(Turbulence::Exponential { deviation_m_s, .. }) => *deviation_m_s,
+        Some(Turbulence::VonKarman(found)) => found.variance_m2_s2().sqrt(),
+        // Not known yet: at least what neighbours differ by.
+        Some(Turbulence::OfScan) => of_all / WITH_MEDIAN,
+        None => 0.0,
+    };
     let mut spikes = 0;
     for (at, off) in off.indexed_iter() {
         let deviation = kept

@@ -5,14 +5,15 @@
 //! l(t1, t2; L) = -1/2 sum_i [ln(t1 lambda_i + t2) + y_i^2/(t1 lambda_i + t2)],   t1 = eps^(2/3),  t2 = variance of the noise
 //! ```
 //!
-//! X holds the components of a mean wind and of its gradient with height, so that neither says anything of the turbulence (Patterson and
-//! Thompson 1971). Blocks of one geometry share their eigenvalues. Check: `edr_fit.csv`.
+//! X holds the components of a mean wind and of its gradient with height, or what else is fitted beside the turbulence, so that neither says
+//! anything of it (Patterson and Thompson 1971). Blocks of one geometry share their eigenvalues. Check: `edr_fit.csv`.
 
 use ndarray::Array2;
 use std::collections::BTreeMap;
 
 use super::gate_covariance::{GateCovariance, GatePosition};
-use crate::error::Error;
+use crate::error::{Error, length};
+use crate::linalg::dot;
 use crate::linalg::tridiagonal::eigenvalues_with_components;
 use crate::parallel::map_each;
 
@@ -58,6 +59,8 @@ pub struct Block {
     pub(super) noise_std_m_s: Vec<f64>,
     /// Heights over the mean one of the block \[m\].
     heights_m: Vec<f64>,
+    /// Columns of a mean that is no linear wind, of unit length \[m/s\].
+    other_mean: Vec<Vec<f64>>,
 }
 
 impl Block {
@@ -69,6 +72,7 @@ impl Block {
             velocity_m_s: Vec::with_capacity(samples.len()),
             noise_std_m_s: Vec::with_capacity(samples.len()),
             heights_m: Vec::with_capacity(samples.len()),
+            other_mean: Vec::new(),
         };
         let heights: f64 = samples.iter().map(GateSample::height_m).sum();
         let mean_m = heights / samples.len().max(1) as f64;
@@ -81,6 +85,36 @@ impl Block {
             block.heights_m.push(sample.height_m() - mean_m);
         }
         block
+    }
+
+    /// The block of what is left of velocities \[m/s\] after a fit, with the standard deviations of their noise \[m/s\], up to a common
+    /// factor. The mean is any combination of `columns`, the derivatives of the fit by its parameters, each in its own unit.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for lists of different lengths.
+    pub fn of_residuals(
+        gates: Vec<GatePosition>,
+        residual_m_s: Vec<f64>,
+        noise_std_m_s: Vec<f64>,
+        columns: &[Vec<f64>],
+    ) -> Result<Self, Error> {
+        length("residual_m_s", gates.len(), residual_m_s.len())?;
+        length("noise_std_m_s", gates.len(), noise_std_m_s.len())?;
+        let mut other_mean = Vec::with_capacity(columns.len());
+        for column in columns {
+            length("columns", gates.len(), column.len())?;
+            let size = dot(column, column).sqrt();
+            if size > 0.0 {
+                other_mean.push(column.iter().map(|value| value / size).collect());
+            }
+        }
+        Ok(Self {
+            heights_m: vec![0.0; gates.len()],
+            gates,
+            velocity_m_s: residual_m_s,
+            noise_std_m_s,
+            other_mean,
+        })
     }
 
     /// Number of velocities.
@@ -101,9 +135,13 @@ impl Block {
         &self.gates
     }
 
-    /// Columns of the mean over the standard deviations of the noise: the components of the directions, and these times the height over
-    /// its spread.
+    /// Columns of the mean over the standard deviations of the noise: those that are given, else the components of the directions, and these
+    /// times the height over its spread.
     pub(super) fn mean_columns(&self) -> Vec<Vec<f64>> {
+        if !self.other_mean.is_empty() {
+            let columns = self.other_mean.iter();
+            return columns.map(|column| self.over_noise(column)).collect();
+        }
         let squares: f64 = self
             .heights_m
             .iter()
@@ -127,8 +165,13 @@ impl Block {
 
     /// Velocities over the standard deviations of the noise.
     fn whitened(&self) -> Vec<f64> {
-        let both = self.velocity_m_s.iter().zip(&self.noise_std_m_s);
-        both.map(|(velocity, std)| velocity / std).collect()
+        self.over_noise(&self.velocity_m_s)
+    }
+
+    /// Numbers of the velocities over the standard deviations of the noise.
+    fn over_noise(&self, numbers: &[f64]) -> Vec<f64> {
+        let both = numbers.iter().zip(&self.noise_std_m_s);
+        both.map(|(number, std)| number / std).collect()
     }
 
     /// Positions and directions relative to the first gate, in steps of [`SAME_GEOMETRY`].
@@ -142,6 +185,9 @@ impl Block {
             }
             key.push((self.heights_m[i] / SAME_GEOMETRY).round() as i64);
             key.push((self.noise_std_m_s[i] / SAME_GEOMETRY).round() as i64);
+        }
+        for number in self.other_mean.iter().flatten() {
+            key.push((number / SAME_GEOMETRY).round() as i64);
         }
         key
     }

@@ -346,7 +346,7 @@ fn scatter_in_turbulence() {
             .told("sandwich", &case.bound, (f64::INFINITY, 0.2))
             .0
     );
-    case.options.turbulence = Some(Turbulence {
+    case.options.turbulence = Some(Turbulence::Exponential {
         deviation_m_s: 1.2,
         length_m: 25.0,
     });
@@ -414,7 +414,7 @@ fn statistics_of_empty_scans() {
     let factor = turbulence_factor(&thinned(case("a")).map, 0.8, 25.0);
     let correlated = empty_statistics(60, Some(&factor), &RetrievalOptions::default());
     println!("turbulent {correlated:.1?}");
-    let turbulence = Some(Turbulence {
+    let turbulence = Some(Turbulence::Exponential {
         deviation_m_s: 0.8,
         length_m: 25.0,
     });
@@ -950,7 +950,7 @@ fn impossible_scans_and_options_are_refused_with_the_field() {
             "std_m of the gate",
         );
     }
-    let turbulence = Some(Turbulence {
+    let turbulence = Some(Turbulence::Exponential {
         deviation_m_s: 0.0,
         length_m: 25.0,
     });

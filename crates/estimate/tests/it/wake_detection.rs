@@ -28,9 +28,11 @@ struct Case {
     model: WakeModel,
 }
 
-const TURBULENCE: Turbulence = Turbulence {
-    deviation_m_s: 0.8,
-    length_m: 25.0,
+const DEVIATION_M_S: f64 = 0.8;
+const LENGTH_M: f64 = 25.0;
+const TURBULENCE: Turbulence = Turbulence::Exponential {
+    deviation_m_s: DEVIATION_M_S,
+    length_m: LENGTH_M,
 };
 
 impl Case {
@@ -127,12 +129,11 @@ impl Case {
                 .position_m(self.range_m[at.1], self.elevation_rad[at.0])
         };
         let places: Vec<(f64, f64)> = known.iter().map(|at| place(*at)).collect();
-        let factor = turbulence.map(|turbulence| {
+        let factor = turbulence.map(|_| {
             let n = places.len();
             factor(Array2::from_shape_fn((n, n), |(i, j)| {
                 let distance_m = (places[i].0 - places[j].0).hypot(places[i].1 - places[j].1);
-                let covariance =
-                    turbulence.deviation_m_s.powi(2) * (-distance_m / turbulence.length_m).exp();
+                let covariance = DEVIATION_M_S.powi(2) * (-distance_m / LENGTH_M).exp();
                 covariance + if i == j { 1e-6 } else { 0.0 }
             }))
         });
@@ -697,9 +698,9 @@ fn laws_repeat_and_impossible_tests_are_refused() {
             .to_string()
             .contains("spacing_m")
     );
-    let still = Turbulence {
+    let still = Turbulence::Exponential {
+        deviation_m_s: DEVIATION_M_S,
         length_m: 0.0,
-        ..TURBULENCE
     };
     assert!(
         build(&case, &with((20.0, 60.0), Some(still)))

@@ -72,8 +72,8 @@ impl FolderArgs {
 /// What is known of the air and of the gates.
 #[derive(Debug, Args)]
 pub(super) struct AirArgs {
-    /// Standard deviation in m/s and length scale in m of turbulence.
-    #[arg(long, value_name = "SIGMA,LENGTH", value_parser = turbulence)]
+    /// Turbulence: auto (found in each scan), or deviation, length (m/s, m); by default none.
+    #[arg(long, value_name = "auto|SIGMA,LENGTH", value_parser = turbulence)]
     pub(super) turbulence: Option<Turbulence>,
     /// Standard deviation of the gate's range weighting in m; 0 for points.
     #[arg(long, value_name = "M", value_parser = not_negative)]
@@ -290,15 +290,18 @@ pub(super) fn range(word: &str) -> Result<f64, String> {
 }
 
 pub(super) fn turbulence(word: &str) -> Result<Turbulence, String> {
+    if word == "auto" {
+        return Ok(Turbulence::OfScan);
+    }
     let (deviation_m_s, length_m) = two(
         word,
         |(deviation_m_s, length_m): &(f64, f64)| {
             let are_finite = deviation_m_s.is_finite() && length_m.is_finite();
             are_finite && *deviation_m_s > 0.0 && *length_m > 0.0
         },
-        "two numbers above 0, m/s and m, with a comma between, e.g. 1.2,25",
+        "auto, or two numbers above 0, m/s and m, with a comma between, e.g. 1.2,25",
     )?;
-    Ok(Turbulence {
+    Ok(Turbulence::Exponential {
         deviation_m_s,
         length_m,
     })

@@ -3,8 +3,9 @@
 use super::Cli;
 use super::args::{AirArgs, FolderArgs, ScanArgs, finite, rate, refuse_idle, spacing, stride};
 use super::data_files::each_usable;
-use super::options::WITHOUT_SCANS;
+use super::options::{WITHOUT_SCANS, refusal_of_idle};
 use crate::Error;
+use crate::detection::scan_turbulence::{turbulence_json, turbulence_text};
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test,
     scan_table, share_table,
@@ -20,7 +21,7 @@ use crate::scene::Scene;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
-use wakescope_estimate::retrieval::{Gate, ScanMap};
+use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
 use wakescope_estimate::vortex_fit::{Vortex, WakeModel};
 use wakescope_estimate::wake_detection::DetectorOptions;
 
@@ -62,6 +63,10 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
     refuse_idle(&args.data, cli)?;
     if args.data.is_empty() {
         cli.refuse_idle("detect", WITHOUT_SCANS)?;
+        if args.air.turbulence == Some(Turbulence::OfScan) {
+            let reason = "auto finds it in scans, and no file of scans is read";
+            return Err(refusal_of_idle("detect", "turbulence", reason));
+        }
     }
     let observer = cli.observer();
     let stated = match &args.scene {
@@ -226,6 +231,9 @@ fn add_scan(scan: &ReadScan, found: &ScanDetection, lines: &mut Vec<String>) {
             digits(sigma_m_s)
         ));
     }
+    if let Some(turbulence) = &found.turbulence {
+        lines.push(format!("  {}", turbulence_text(turbulence)));
+    }
     if found.is_correlated() {
         let (along, across) = found.statistic.neighbour_correlation;
         lines.push(format!(
@@ -281,7 +289,7 @@ fn list(args: &DetectArgs, result: Option<Tested<'_>>, files: &mut Outputs) -> R
 
 fn scan_object(scan: &ReadScan, found: &ScanDetection) -> Value {
     let statistic = &found.statistic;
-    json!({
+    let mut object = json!({
         "file": scan.path.to_string_lossy(), "sweep": scan.sweep, "wake": found.is_wake(), "statistic": statistic.value,
         "threshold": found.threshold, "false_alarm": found.false_alarm, "left": vortex_object(statistic.wake.left),
         "right": vortex_object(statistic.wake.right), "gamma_std_m2_s": statistic.circulation_std_m2_s,
@@ -289,7 +297,11 @@ fn scan_object(scan: &ReadScan, found: &ScanDetection) -> Value {
         "velocities": found.velocities, "outliers": found.outliers, "assumed_sigma_m_s": found.assumed_sigma_m_s,
         "neighbour_correlation": [statistic.neighbour_correlation.0, statistic.neighbour_correlation.1],
         "correlated": found.is_correlated(), "gumbel": [found.gumbel.0, found.gumbel.1],
-    })
+    });
+    if let Some(turbulence) = &found.turbulence {
+        object["turbulence"] = turbulence_json(turbulence);
+    }
+    object
 }
 
 /// A vortex; null without circulation.

@@ -9,6 +9,7 @@ use super::options::{
     BESIDE_GATE_STD, BESIDE_OWN_SCENE, BY_RADIAL_VELOCITIES, ESTIMATOR_BESIDE_GATE_STD, OF_MEANS,
     WITHOUT_SCENE, refusal_of_idle,
 };
+use crate::detection::scan_turbulence::turbulence_text;
 use crate::io::Provenance;
 use crate::io::scans::{ReadScan, are_of_one_plane, face_alike, plane_numbers, share_origin};
 use crate::outputs::Outputs;
@@ -21,7 +22,7 @@ use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use wakescope_estimate::retrieval::{
-    EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Velocities,
+    EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Turbulence, Velocities,
 };
 use wakescope_estimate::vortex_fit::{CoreProfile, Secondary, Wake};
 
@@ -80,6 +81,9 @@ pub(super) struct RetrieveArgs {
     folder: FolderArgs,
 }
 
+/// Why turbulence is not in fits of estimates.
+const INDEPENDENT: &str = "what the estimator shows of a wake is fitted with independent errors; those of means may be shared";
+
 /// Sampling of an instrument of which it is not known, Hz.
 const WIDE_HZ: f64 = 500e6;
 
@@ -112,14 +116,13 @@ impl RetrieveArgs {
     /// Refuses options that have no effect on a scan with velocities of a kind.
     fn refuse_idle_on(&self, scan: &ReadScan, velocities: Velocities<'_>) -> Result<(), Error> {
         let has_turbulence = self.air.turbulence.is_some();
+        let is_of_scan = self.air.turbulence == Some(Turbulence::OfScan);
         let (name, reason) = match velocities {
             _ if self.motion != Movement::Auto && !scan.map.has_times() => {
                 ("motion", "its lines have no times")
             }
-            Velocities::Estimates(_) if has_turbulence => (
-                "turbulence",
-                "what the estimator shows of a wake is fitted with independent errors; those of means may be shared",
-            ),
+            Velocities::Estimates(_) if has_turbulence => ("turbulence", INDEPENDENT),
+            Velocities::LikelyEstimates(_) if is_of_scan => ("turbulence", INDEPENDENT),
             Velocities::Means | Velocities::Unknown
                 if has_turbulence && self.secondary.is_some() =>
             {
@@ -578,6 +581,9 @@ fn text(found: &[RetrievedScan]) -> String {
             let side = retrieve::name(vortex.side);
             out +=
                 &format!("{name}: {side:<5} Gamma(5-15 m) {circulation} at y {y}, z {z}{flags}\n");
+        }
+        if let Some(turbulence) = &scan.result.turbulence {
+            out += &format!("{name}: {}\n", turbulence_text(turbulence));
         }
     }
     out

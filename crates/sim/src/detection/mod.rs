@@ -2,13 +2,17 @@
 //!
 //! | module | content |
 //! |---|---|
+//! | `air` | turbulence that is found in each scan |
+//! | `scan_turbulence` | columns and JSON of that turbulence |
 //! | `scene_noise` | deviations of a scene's velocities, and how far apart they are independent, from scans of still air |
 //! | `tables`, `pictures` | what is written |
 //!
 //! Check: a wake is found and empty scans are not, at their rate; results do not depend on threads.
 
+mod air;
 #[cfg(feature = "plots")]
 mod pictures;
+pub(crate) mod scan_turbulence;
 mod scene_noise;
 mod tables;
 
@@ -20,8 +24,9 @@ pub use tables::{scan_table, share_table};
 use crate::Error;
 use crate::progress::{Observer, Stage};
 use crate::streams::stream;
+use ndarray::Array2;
 use wakescope_estimate::Measured;
-use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
+use wakescope_estimate::retrieval::{Gate, ScanMap, ScanTurbulence, Turbulence};
 use wakescope_estimate::vortex_fit::WakeModel;
 use wakescope_estimate::wake_detection::{
     DetectorOptions, EmptyScanLaw, WakeDetector, WakeStatistic, without_spikes,
@@ -86,6 +91,8 @@ pub struct ScanDetection {
     pub velocities: usize,
     /// Standard deviation that was taken for all velocities, m/s, where the scan states none.
     pub assumed_sigma_m_s: Option<f64>,
+    /// The turbulence of the background, if it was found in the scan.
+    pub turbulence: Option<ScanTurbulence>,
     /// mu and beta of Gumbel's law with the moments of the empty scans.
     pub gumbel: (f64, f64),
 }
@@ -137,6 +144,7 @@ pub struct Calibration {
     law: EmptyScanLaw,
     threshold: f64,
     assumed_sigma_m_s: Option<f64>,
+    turbulence: Option<Turbulence>,
 }
 
 impl Calibration {
@@ -153,24 +161,15 @@ impl Calibration {
         let mut map = map.clone();
         let mut assumed_sigma_m_s = None;
         if map.sigma_m_s.is_none() {
-            map.sigma_m_s = Some(ndarray::Array2::ones(map.velocity_m_s.raw_dim()));
-            let calm = DetectorOptions {
-                turbulence: None,
-                ..settings.options
-            };
-            let unit = WakeDetector::new(&map, &settings.model, &settings.gate, &calm)?;
-            let all = unit.statistic(map.velocity_m_s.view())?.wake_chi2_per_dof;
-            let air = settings
-                .options
-                .turbulence
-                .map_or(0.0, |turbulence| turbulence.deviation_m_s.powi(2));
-            // turbulence has its part of what is left; some noise there must be
-            let sigma_m_s = (all - air).max(0.01 * all).sqrt();
-            map.sigma_m_s = Some(ndarray::Array2::from_elem(
-                map.velocity_m_s.raw_dim(),
-                sigma_m_s,
-            ));
-            assumed_sigma_m_s = Some(sigma_m_s);
+            map = air::with_unit_noise(&map);
+            if let Some(Turbulence::VonKarman(found)) = settings.options.turbulence {
+                // Its covariance has the noise, as a factor of that of the map.
+                assumed_sigma_m_s = Some(found.noise_std_m_s);
+            } else {
+                let sigma_m_s = noise_m_s(&map, settings)?;
+                map.sigma_m_s = Some(Array2::from_elem(map.velocity_m_s.raw_dim(), sigma_m_s));
+                assumed_sigma_m_s = Some(sigma_m_s);
+            }
         }
         let detector = WakeDetector::new(&map, &settings.model, &settings.gate, &settings.options)?;
         observer.begin(Stage::Detection, settings.empty_scans as u64);
@@ -186,11 +185,16 @@ impl Calibration {
             law,
             threshold,
             assumed_sigma_m_s,
+            turbulence: settings.options.turbulence,
         })
     }
 
-    /// Whether the calibration holds for another scan: the same axes, nearly the same velocities missing, deviations within a tenth.
-    fn is_for(&self, map: &ScanMap) -> bool {
+    /// Whether the calibration holds for another scan: the same axes and turbulence, nearly the same velocities missing, deviations within a
+    /// tenth.
+    fn is_for(&self, map: &ScanMap, settings: &DetectionSettings) -> bool {
+        if settings.options.turbulence != self.turbulence {
+            return false;
+        }
         let same_axes =
             map.elevation_rad == self.map.elevation_rad && map.range_m == self.map.range_m;
         if !same_axes || map.sigma_m_s.is_none() != self.assumed_sigma_m_s.is_some() {
@@ -240,6 +244,10 @@ impl Calibration {
             outliers: *outliers,
             velocities: *velocities,
             assumed_sigma_m_s: self.assumed_sigma_m_s,
+            turbulence: match self.turbulence {
+                Some(Turbulence::VonKarman(found)) => Some(found),
+                _ => None,
+            },
             gumbel: self.law.gumbel(),
         })
     }
@@ -303,12 +311,32 @@ impl Calibration {
     }
 }
 
+/// Standard deviation of the noise, m/s, that the best wake leaves of a map with one of 1 m/s, in given turbulence.
+///
+/// # Errors
+/// What the test refuses.
+fn noise_m_s(map: &ScanMap, settings: &DetectionSettings) -> Result<f64, Error> {
+    let calm = DetectorOptions {
+        turbulence: None,
+        ..settings.options
+    };
+    let unit = WakeDetector::new(map, &settings.model, &settings.gate, &calm)?;
+    let all = unit.statistic(map.velocity_m_s.view())?.wake_chi2_per_dof;
+    let air = match settings.options.turbulence {
+        Some(Turbulence::Exponential { deviation_m_s, .. }) => deviation_m_s.powi(2),
+        _ => 0.0,
+    };
+    // turbulence has its part of what is left; some noise there must be
+    Ok((all - air).max(0.01 * all).sqrt())
+}
+
 /// Standard deviation of a velocity of a map, NaN where none is stated.
 fn sigma_at(map: &ScanMap, at: (usize, usize)) -> f64 {
     map.sigma_m_s.as_ref().map_or(f64::NAN, |sigma| sigma[at])
 }
 
-/// Tests scans one after the other; those that are alike share a calibration. Returns the first calibration, too.
+/// Tests scans one after the other; those that are alike share a calibration, unless each has turbulence of its own. Returns the first
+/// calibration, too.
 ///
 /// # Errors
 /// What the test refuses of a scan.
@@ -321,13 +349,14 @@ pub fn detect(
     let mut calibrations = Vec::<Calibration>::new();
     for scan in scans {
         let cleaned = cleaned(scan, settings);
+        let own = air::of_scan(&cleaned.0, settings)?;
         if !calibrations
             .last()
-            .is_some_and(|known| known.is_for(&cleaned.0))
+            .is_some_and(|known| known.is_for(&cleaned.0, &own))
         {
             // the first is kept for its curves, the last for the next scan
             calibrations.truncate(1);
-            calibrations.push(Calibration::new(&cleaned.0, settings, observer)?);
+            calibrations.push(Calibration::new(&cleaned.0, &own, observer)?);
         }
         found.extend(
             calibrations
@@ -356,16 +385,16 @@ pub fn background(settings: &DetectionSettings, has_sigma: bool) -> String {
         true => "independent noise with the stated deviation of each velocity",
         false => "independent noise of one deviation, that of what is left of the scan",
     };
-    let air = settings
-        .options
-        .turbulence
-        .map_or(String::new(), |turbulence| {
-            let Turbulence {
-                deviation_m_s,
-                length_m,
-            } = turbulence;
-            format!(", and turbulence of {deviation_m_s} m/s correlated over {length_m} m")
-        });
+    let air = match settings.options.turbulence {
+        None => String::new(),
+        Some(Turbulence::Exponential {
+            deviation_m_s,
+            length_m,
+        }) => format!(", and turbulence of {deviation_m_s} m/s correlated over {length_m} m"),
+        Some(Turbulence::VonKarman(_) | Turbulence::OfScan) => {
+            ", and isotropic turbulence of the dissipation and outer scale of each scan".to_owned()
+        }
+    };
     format!("a wind that is linear in height, {noise}{air}")
 }
 
@@ -373,7 +402,6 @@ pub fn background(settings: &DetectionSettings, has_sigma: bool) -> String {
 mod tests {
     use super::*;
     use crate::progress::Silent;
-    use ndarray::Array2;
     use rand_xoshiro::rand_core::Rng;
     use wakescope_estimate::vortex_fit::Wake;
 

@@ -1,5 +1,6 @@
 //! What detection writes: a row for each scan, and the curves of its geometry and background.
 
+use super::scan_turbulence::with_turbulence;
 use super::{FoundShare, Power, ScanDetection};
 use crate::io::Table;
 use crate::io::scans::ReadScan;
@@ -25,7 +26,8 @@ pub fn scan_table(scans: &[ReadScan], found: &[ScanDetection]) -> Table {
         .float("statistic", statistics)
         .float("threshold", thresholds)
         .float("false_alarm", false_alarms);
-    with_background(with_wakes(table, found), found)
+    let table = with_background(with_wakes(table, found), found);
+    with_turbulence(table, found.iter().map(|f| f.turbulence))
 }
 
 /// Adds the best wake of each scan.

@@ -3,6 +3,7 @@
 //! Check: rows of no wake, one vortex and two; a series of scans of a pair that sinks, in the tests of the program.
 
 use crate::Error;
+use crate::detection::scan_turbulence::{turbulence_json, with_turbulence};
 use crate::io::Table;
 use crate::io::scans::{ReadScan, plane_numbers};
 use serde::Serialize;
@@ -52,7 +53,7 @@ fn vortices_of(scans: &[RetrievedScan]) -> Vec<Row<'_>> {
     of
 }
 
-/// A row for each vortex and scan; a scan without a wake has one row without a vortex.
+/// A row for each vortex and scan; a scan without a wake has one row without a vortex. Turbulence has columns if it was found in a scan.
 pub fn rows(scans: &[RetrievedScan]) -> Table {
     let of = vortices_of(scans);
     let read = of.iter().map(|(_, scan, _)| &scan.scan);
@@ -88,7 +89,7 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
     let cells_rejected = results.clone().map(|result| result.cells_rejected as i64);
     let statistics = results.clone().map(|result| result.statistic);
     let thresholds = results.clone().map(|result| result.threshold);
-    table
+    table = table
         .float(
             "chi2_per_dof",
             results.clone().map(|result| result.chi2_per_dof),
@@ -96,8 +97,9 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
         .int("cells_used", cells_used)
         .int("cells_rejected", cells_rejected)
         .float("statistic", statistics)
-        .float("threshold", thresholds)
-        .text("flags", results.map(flags))
+        .float("threshold", thresholds);
+    let turbulence = results.clone().map(|result| result.turbulence);
+    with_turbulence(table, turbulence).text("flags", results.map(flags))
 }
 
 /// A column of numbers and one of their deviations.
@@ -258,7 +260,7 @@ fn scan_json(number: usize, scan: &RetrievedScan) -> Value {
     let tops: Vec<Value> = tops
         .map(|top| json!({ "wake": wake_json(&top.wake), "chi2": top.chi2 }))
         .collect();
-    json!({
+    let mut object = json!({
         "scan": number, "file": scan.scan.path.to_string_lossy(), "sweep": scan.scan.sweep, "azimuth_rad": scan.scan.azimuth_rad,
         "reference_time_s": r.reference_time_s, "vortices": vortices,
         "wind_m_s": r.lateral_wind_m_s, "shear_per_s": r.wind_shear_per_s,
@@ -266,7 +268,11 @@ fn scan_json(number: usize, scan: &RetrievedScan) -> Value {
         "statistic": r.statistic, "threshold": r.threshold, "flags": r.flags,
         "parameters": parameters, "wake": r.wake.as_ref().map(wake_json), "covariance": covariance,
         "secondary": secondary, "tops": tops,
-    })
+    });
+    if let Some(turbulence) = &r.turbulence {
+        object["turbulence"] = turbulence_json(turbulence);
+    }
+    object
 }
 
 /// The parameters of a wake by name. JSON has no NaN: what is not known is null.

@@ -10,14 +10,10 @@ use crate::Error;
 use crate::io::scans::Ray;
 use std::collections::BTreeMap;
 use wakescope_estimate::wind_profile::{
-    Block, GateCovariance, GatePosition, GateSample, TurbulenceFit, spectra, turbulence_covariance,
+    Block, GateCovariance, GatePosition, GateSample, OUTER_SCALES_M, TurbulenceFit,
+    outer_scale_probabilities, spectra, turbulence_covariance,
 };
 
-/// Outer scales that are tried, m: each twice the one before.
-const OUTER_SCALES_M: [f64; 7] = [15.0, 30.0, 60.0, 120.0, 240.0, 480.0, 960.0];
-/// What is known of them before: a lognormal distribution.
-const USUAL_OUTER_SCALE_M: f64 = 100.0;
-const OUTER_SCALE_SPREAD: f64 = 0.8;
 /// Most velocities of a block.
 const LARGEST_BLOCK: usize = 512;
 /// Fewest contrasts of the velocities of a layer that tell of turbulence.
@@ -347,23 +343,12 @@ fn extent_m(layer: &Layer) -> f64 {
 
 /// Probability of each outer scale, from the likelihoods of all layers and from what is known before.
 fn probabilities(outer_scales_m: &[f64], fits: &[(&Layer, Vec<TurbulenceFit>)]) -> Vec<(f64, f64)> {
-    let mut logarithms = Vec::with_capacity(outer_scales_m.len());
-    for (number, outer_scale_m) in outer_scales_m.iter().enumerate() {
-        let away = (outer_scale_m / USUAL_OUTER_SCALE_M).ln() / OUTER_SCALE_SPREAD;
-        let mut logarithm = -0.5 * away * away;
-        for (_, fits) in fits {
-            logarithm += fits[number].likelihood;
-        }
-        logarithms.push(logarithm);
+    let mut likelihoods = Vec::with_capacity(fits.len());
+    for (_, fits) in fits {
+        likelihoods.push(fits.iter().map(|fit| fit.likelihood).collect());
     }
-    let largest = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = logarithms.iter().map(|l| (l - largest).exp()).collect();
-    let total: f64 = weights.iter().sum();
-    let mut out = Vec::with_capacity(weights.len());
-    for (outer_scale_m, weight) in outer_scales_m.iter().zip(weights) {
-        out.push((*outer_scale_m, weight / total));
-    }
-    out
+    let probabilities = outer_scale_probabilities(outer_scales_m, &likelihoods);
+    outer_scales_m.iter().copied().zip(probabilities).collect()
 }
 
 /// Turbulence of a layer, averaged over the outer scales. How much blocks that share eddies widen the deviation is found at the

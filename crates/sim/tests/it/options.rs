@@ -227,6 +227,11 @@ const KINDS: &[Kind] = &[
         "table.csv --turbulence 0.5,25 --out out",
         &["secondary"],
     ),
+    some(
+        "retrieve",
+        "table.csv --turbulence auto --out out",
+        &["secondary"],
+    ),
     all("wind", "fan.csv --out out"),
     some(
         "wind",

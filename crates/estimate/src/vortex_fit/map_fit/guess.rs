@@ -71,7 +71,7 @@ impl Search {
         let blocks = map.block_medians(map.blocks(SEARCHED));
         let cells = Cells::new(&blocks.view(), model);
         let velocities = cells.means(blocks.velocity_m_s.view())?;
-        let background = Background::new(&cells, None)?;
+        let background = Background::new(&cells, None, 0.0)?;
         let (places_m, core_m) = places(map, model);
         let kernel = kernel.coarser(COARSER);
         let (filter, gram) =

@@ -1,0 +1,263 @@
+//! Turbulence of a scan, found in the scan itself: dissipation rate, outer scale and noise from what a fit leaves.
+//!
+//! ```text
+//! K = sum_L p(L) (t1 B(L) + t2 diag(sigma^2)),   t1 = eps^(2/3)
+//! ```
+//!
+//! Contrasts of the velocities that are orthogonal to the derivatives of the fit by its parameters hold nothing of the wake, to first order, so
+//! that no velocity has to be skipped. Their restricted likelihood gives t1, t2 and the probability p of each outer scale. Blocks of a few
+//! hundred velocities of consecutive lines count as independent.
+//! Check: `circulations_in_turbulence` in the tests of the program.
+
+use ndarray::Array2;
+
+use crate::Measured;
+use crate::error::Error;
+use crate::parallel::map_each;
+use crate::retrieval::Whitening;
+use crate::turbulence::VonKarman;
+use crate::vortex_fit::map_fit::least_squares::Rows;
+use crate::wind_profile::{
+    Block, GateCovariance, GatePosition, OUTER_SCALES_M, outer_scale_probabilities, spectra,
+};
+
+/// Most velocities of a block: the time of its eigenvalues grows with the cube.
+const LARGEST_BLOCK: usize = 512;
+/// Fewest degrees of freedom that the variance of a contrast has.
+const FEWEST_DEGREES: f64 = 5.0;
+/// Fewest contrasts that tell turbulence from noise.
+const FEWEST_CONTRASTS: usize = 30;
+
+/// Isotropic turbulence with the spectrum of von Karman, as a scan shows it beside its wake.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScanTurbulence {
+    /// eps^(2/3) \[m^(4/3)/s^2\], averaged over the outer scales; its standard deviation contains what is not known of them.
+    pub eps23: Measured,
+    /// Standard deviation of the noise \[m/s\], root mean square over the velocities.
+    pub noise_std_m_s: f64,
+    /// Probability of each of [`OUTER_SCALES_M`].
+    pub outer_scale_probability: [f64; OUTER_SCALES_M.len()],
+    /// eps^(2/3) at each outer scale times its probability.
+    pub(crate) eps23_weights: [f64; OUTER_SCALES_M.len()],
+    /// Variance of the noise over that of the given standard deviations.
+    pub(crate) noise_factor: f64,
+    /// Whether it was found beside a wake, not beside the wind alone.
+    pub is_beside_wake: bool,
+}
+
+impl ScanTurbulence {
+    /// Cube root of the dissipation rate \[m^(2/3)/s\]: its value, and the ends of its interval of 95 %.
+    #[must_use]
+    pub fn edr_m23_s(&self) -> [f64; 3] {
+        let Measured { value, std } = self.eps23;
+        [value, value - 1.96 * std, value + 1.96 * std].map(|eps23| eps23.max(0.0).sqrt())
+    }
+
+    /// Outer scale \[m\]: mean of the logarithm over the probabilities.
+    #[must_use]
+    pub fn outer_scale_m(&self) -> f64 {
+        let all = OUTER_SCALES_M.iter().zip(self.outer_scale_probability);
+        let logarithm: f64 = all.map(|(scale_m, p)| p * scale_m.ln()).sum();
+        logarithm.exp()
+    }
+
+    /// Chi-square of one degree that is as probable as that of a contrast over a variance which is itself known to some degrees of freedom only:
+    /// `part` of it is of this turbulence. With s the sum of squares that gave the variance, t of Student is normal by Wallace's (1959)
+    /// transformation z² = k² ν ln(1 + t²/ν), k = (8ν + 1)/(8ν + 3); beside the wind alone s contains the contrast, so that
+    /// 1 + t²/ν = (ν + 1)/(ν + 1 - T).
+    pub(crate) fn chi2_of_known_variance(&self, chi2: f64, part: f64) -> f64 {
+        let uncertainty = part * self.eps23.std / self.eps23.value.max(f64::MIN_POSITIVE);
+        let all_degrees = (2.0 / (uncertainty * uncertainty)).max(FEWEST_DEGREES);
+        let degrees = match self.is_beside_wake {
+            true => all_degrees,
+            false => all_degrees - 1.0,
+        };
+        let ratio = match self.is_beside_wake {
+            true => 1.0 + chi2 / degrees,
+            false => all_degrees / (all_degrees - chi2).max(1e-3 * all_degrees),
+        };
+        let k = (8.0 * degrees + 1.0) / (8.0 * degrees + 3.0);
+        k * k * degrees * ratio.ln()
+    }
+
+    /// Variance of a component of the velocity at a point \[m²/s²\].
+    #[must_use]
+    pub fn variance_m2_s2(&self) -> f64 {
+        let mut variance_m2_s2 = 0.0;
+        for (outer_scale_m, weight) in OUTER_SCALES_M.into_iter().zip(self.eps23_weights) {
+            let unit = VonKarman {
+                dissipation_m2_s3: 1.0,
+                outer_scale_m,
+                kolmogorov_constant: 1.5,
+            };
+            variance_m2_s2 += weight * unit.variance_m2_s2();
+        }
+        variance_m2_s2
+    }
+
+    /// Covariance \[m²/s²\] of the velocities of gates, the lower triangle filled, from the standard deviations of their noise \[m/s\] as they
+    /// were given. The table is that of [`gate_covariance`] for these gates.
+    pub(crate) fn covariance_m2_s2(
+        &self,
+        table: &GateCovariance,
+        gates: &[GatePosition],
+        noise_std_m_s: &[f64],
+    ) -> Array2<f64> {
+        let rows = map_each(gates.len(), |i| {
+            let mut row = Vec::with_capacity(i + 1);
+            let mut values = [0.0; OUTER_SCALES_M.len()];
+            for other in &gates[..=i] {
+                table.covariance_into(&gates[i], other, &mut values);
+                let mut sum = 0.0;
+                for (value, weight) in values.iter().zip(self.eps23_weights) {
+                    sum += weight * value;
+                }
+                row.push(sum);
+            }
+            row
+        });
+        let mut covariance = Array2::zeros((gates.len(), gates.len()));
+        for (i, row) in rows.into_iter().enumerate() {
+            for (j, value) in row.into_iter().enumerate() {
+                covariance[[i, j]] = value;
+            }
+            covariance[[i, i]] += self.noise_factor * noise_std_m_s[i].powi(2);
+        }
+        covariance
+    }
+}
+
+/// What a fit leaves of the velocities of a scan, line by line.
+pub(crate) struct Remainder {
+    pub(crate) gates: Vec<GatePosition>,
+    residual_m_s: Vec<f64>,
+    /// Standard deviations of the noise \[m/s\], up to a common factor.
+    noise_std_m_s: Vec<f64>,
+    /// Derivatives of the fit by its parameters.
+    slopes: Vec<Vec<f64>>,
+}
+
+impl Remainder {
+    /// From residuals and slopes over the standard deviations of the noise \[m/s\].
+    pub(crate) fn new(gates: Vec<GatePosition>, rows: Rows, noise_std_m_s: Vec<f64>) -> Self {
+        let mut remainder = Self {
+            gates,
+            residual_m_s: rows.residuals,
+            slopes: rows.slopes,
+            noise_std_m_s,
+        };
+        let Self {
+            residual_m_s,
+            slopes,
+            noise_std_m_s,
+            ..
+        } = &mut remainder;
+        for column in slopes.iter_mut().chain([residual_m_s]) {
+            for (number, std_m_s) in column.iter_mut().zip(&*noise_std_m_s) {
+                *number *= std_m_s;
+            }
+        }
+        remainder
+    }
+
+    /// What makes the velocities white in turbulence; nothing if their covariance is singular.
+    pub(crate) fn whitening(
+        &self,
+        turbulence: &ScanTurbulence,
+        table: &GateCovariance,
+    ) -> Option<Whitening> {
+        Whitening::new(turbulence.covariance_m2_s2(table, &self.gates, &self.noise_std_m_s))
+    }
+
+    /// The turbulence; none where the velocities are too few to tell it from noise.
+    ///
+    /// # Errors
+    /// [`Error::Linalg`] for numbers that are not finite.
+    pub(crate) fn turbulence(
+        &self,
+        table: &GateCovariance,
+    ) -> Result<Option<ScanTurbulence>, Error> {
+        let spectra = spectra(&self.blocks()?, table)?;
+        if spectra[0].len() < FEWEST_CONTRASTS {
+            return Ok(None);
+        }
+        let mut fits = Vec::with_capacity(spectra.len());
+        for spectrum in &spectra {
+            let Some(fit) = spectrum.maximum() else {
+                return Ok(None);
+            };
+            fits.push(fit);
+        }
+        let likelihoods = fits.iter().map(|fit| fit.likelihood).collect();
+        let probabilities = outer_scale_probabilities(&OUTER_SCALES_M, &[likelihoods]);
+        let mut found = ScanTurbulence {
+            eps23: Measured::default(),
+            noise_std_m_s: 0.0,
+            outer_scale_probability: [0.0; OUTER_SCALES_M.len()],
+            eps23_weights: [0.0; OUTER_SCALES_M.len()],
+            noise_factor: 0.0,
+            is_beside_wake: true,
+        };
+        let mut square = 0.0;
+        for (i, (fit, probability)) in fits.iter().zip(probabilities).enumerate() {
+            found.outer_scale_probability[i] = probability;
+            found.eps23_weights[i] = probability * fit.eps23;
+            found.eps23.value += probability * fit.eps23;
+            found.noise_factor += probability * fit.noise_m2_s2;
+            square += probability * (fit.eps23 * fit.eps23 + fit.covariance[0][0]);
+        }
+        found.eps23.std = (square - found.eps23.value.powi(2)).max(0.0).sqrt();
+        let squares: f64 = self.noise_std_m_s.iter().map(|std| std * std).sum();
+        let mean_square = squares / self.noise_std_m_s.len() as f64;
+        found.noise_std_m_s = (found.noise_factor * mean_square).sqrt();
+        Ok(Some(found))
+    }
+
+    /// Blocks of nearly equal length.
+    fn blocks(&self) -> Result<Vec<Block>, Error> {
+        let count = self.gates.len();
+        let pieces = count.div_ceil(LARGEST_BLOCK).max(1);
+        let length = count.div_ceil(pieces).max(1);
+        let mut blocks = Vec::with_capacity(pieces);
+        for first in (0..count).step_by(length) {
+            let range = first..(first + length).min(count);
+            let mut columns = Vec::with_capacity(self.slopes.len());
+            for slope in &self.slopes {
+                columns.push(slope[range.clone()].to_vec());
+            }
+            let block = Block::of_residuals(
+                self.gates[range.clone()].to_vec(),
+                self.residual_m_s[range.clone()].to_vec(),
+                self.noise_std_m_s[range].to_vec(),
+                &columns,
+            )?;
+            blocks.push(block);
+        }
+        Ok(blocks)
+    }
+}
+
+/// Covariance of the velocities of gates with a Gaussian weight of that standard deviation \[m\] at all of [`OUTER_SCALES_M`].
+///
+/// # Errors
+/// [`Error::OutOfRange`] for a negative width of the gates.
+pub(crate) fn gate_covariance(
+    gates: &[GatePosition],
+    gate_std_m: f64,
+) -> Result<GateCovariance, Error> {
+    GateCovariance::new(gate_std_m, &OUTER_SCALES_M, farthest_m(gates))
+}
+
+/// A distance that no two gates exceed \[m\], at least 1 m.
+fn farthest_m(gates: &[GatePosition]) -> f64 {
+    let mut low = [f64::INFINITY; 3];
+    let mut high = [f64::NEG_INFINITY; 3];
+    for gate in gates {
+        for d in 0..3 {
+            low[d] = low[d].min(gate.position_m[d]);
+            high[d] = high[d].max(gate.position_m[d]);
+        }
+    }
+    let squares = (0..3).map(|d| (high[d] - low[d]).powi(2));
+    squares.sum::<f64>().sqrt().max(1.0)
+}
