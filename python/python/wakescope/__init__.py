@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import xarray
 
 __all__ = [
-    "Progress", "Result", "Scene", "WakescopeError", "__version__", "accuracy", "bound", "budget", "case", "check", "detect",
+    "Progress", "Result", "Scene", "WakescopeError", "__version__", "accuracy", "bound", "budget", "case", "check", "dataset", "detect",
     "efficiency", "estimate", "flow", "presets", "retrieve", "run", "scene", "score", "sweep", "wake", "wind",
 ]  # fmt: skip
 
@@ -164,6 +164,14 @@ def accuracy(scene: Scene, within: float, **options: Any) -> xarray.Dataset:
     errors, and the cheapest value whose error is `within` a relative error, such as 0.03."""
     result = _command("accuracy", scene, within=within, **options)
     return attributes(result["accuracy"], result.answer)
+
+
+def dataset(plan: Scene | None, out: Path_, progress: Progress = None, **options: Any) -> dict[str, Any]:
+    """Simulates a data set with exact truth into a folder, by a plan or with `plan=None` by a `preset`; `shard="1/4"`, `resume=True`.
+
+    The arrays are `xarray.open_zarr(f"{out}/scans.zarr")`; returned is what was done.
+    """
+    return _command("dataset", plan, out=out, progress=progress, **options).answer
 
 
 def flow(case: Scene, out: Path_ | None = None, progress: Progress = None, **options: Any) -> Result:

@@ -230,7 +230,7 @@ impl Axes<'_> {
         let others =
             "velocity_standard_deviation signal_to_noise_ratio spectral_width quality flag";
         let standard_name = "radial_velocity_of_scatterers_away_from_instrument";
-        let mut all = vec![
+        Ok(vec![
             self.cells(
                 "velocity",
                 VELOCITY_STEP_M_S,
@@ -271,6 +271,12 @@ impl Axes<'_> {
             )?
             .with("flag_values", json!([0, 1]))
             .with("flag_meanings", "good flagged"),
+        ])
+    }
+
+    fn of_cells(&self) -> Result<Vec<Array>, Error> {
+        let standard_name = "radial_velocity_of_scatterers_away_from_instrument";
+        let mut all = vec![
             self.cells(
                 "true_velocity",
                 VELOCITY_STEP_M_S,
@@ -376,6 +382,7 @@ pub(super) fn arrays(plan: &DatasetPlan, shape: &Shape) -> Result<Vec<Array>, Er
     let axes = Axes { plan, shape };
     let mut all = axes.coordinates()?;
     all.extend(axes.measured()?);
+    all.extend(axes.of_cells()?);
     all.extend(axes.flights()?);
     all.extend(axes.vortices()?);
     all.push(axes.of_flights(("ready", "uint8"), "", "1 where the flight is there")?);
