@@ -110,6 +110,8 @@ def estimate(signals: numpy.ndarray[Any, Any] | Path_, scene: Scene, **options: 
 def retrieve(data: Scan | Sequence[Scan], scene: Scene | None = None, **options: Any) -> xarray.Dataset:
     """Circulation, place and core of the vortices of scans, with the covariance of the parameters of each."""
     result = _of_scans("retrieve", data, scene, options)
+    if "scans" not in result.answer:
+        return attributes(result["retrieval"], result.answer)
     return covariance(result["retrieval"], result.answer["scans"])
 
 

@@ -3,7 +3,8 @@
 use super::Cli;
 use super::args::{AirArgs, FolderArgs, ScanArgs, finite, rate, refuse_idle, spacing, stride};
 use super::data_files::each_usable;
-use super::options::{WITHOUT_SCANS, refusal_of_idle};
+use super::data_sets::{self, SplitArgs, data_set_of};
+use super::options::{ON_DATA_SET, WITHOUT_DATA_SET, WITHOUT_SCANS, refusal_of_idle};
 use crate::Error;
 use crate::detection::scan_turbulence::{turbulence_json, turbulence_text};
 use crate::detection::{
@@ -14,13 +15,15 @@ use crate::io::Provenance;
 use crate::io::csv::digits;
 use crate::io::scans::ReadScan;
 use crate::outputs::Outputs;
-use crate::plan::{Plan, Target};
-use crate::progress::Observer;
+use crate::plan::{Plan, Stage, Target};
+use crate::progress::{Observer, Silent};
 use crate::retrieve::{gate_of, scene_of};
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneFile};
+use crate::score::PredictedScan;
 use clap::Args;
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use wakescope_estimate::Error as EstimateError;
 use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
 use wakescope_estimate::vortex_fit::{Vortex, WakeModel};
 use wakescope_estimate::wake_detection::DetectorOptions;
@@ -28,7 +31,7 @@ use wakescope_estimate::wake_detection::DetectorOptions;
 /// Arguments of `wakescope detect`.
 #[derive(Debug, Args)]
 pub(super) struct DetectArgs {
-    /// Scans (CfRadial, HALO, CSV) or raw signals; none: detectability of the scene.
+    /// Scans, raw signals or a data set; none: detectability of the scene.
     data: Vec<PathBuf>,
     /// Scene of the instrument: gates, position, noise, correlation of velocities.
     #[arg(long, value_name = "SCENE.toml", required_unless_present = "data")]
@@ -54,6 +57,8 @@ pub(super) struct DetectArgs {
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(2000..=1_000_000))]
     empty_scans: u32,
     #[command(flatten)]
+    splits: SplitArgs,
+    #[command(flatten)]
     scans: ScanArgs,
     #[command(flatten)]
     folder: FolderArgs,
@@ -68,6 +73,10 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
             return Err(refusal_of_idle("detect", "turbulence", reason));
         }
     }
+    if let Some(folder) = data_set_of(&args.data)? {
+        return of_data_set(args, folder, cli);
+    }
+    cli.refuse_idle("detect", WITHOUT_DATA_SET)?;
     let observer = cli.observer();
     let stated = match &args.scene {
         Some(path) => Some(cli.scene(path)?),
@@ -93,7 +102,7 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
     let plan_scene = plan.as_ref().map(|plan| plan.scene());
     let (gate, note) = gate_of(scans.first(), args.air.gate_std, plan_scene)?;
     notes.extend(note.map(str::to_owned));
-    let mut settings = args.settings(cli, plan_scene, gate);
+    let mut settings = args.settings(cli.seed, plan_scene, gate);
     // The grid of the scene, if there are no scans.
     let mut empty = None;
     if let Some(plan) = &plan {
@@ -120,6 +129,64 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
     };
     let result = (&scans[..], &found[..], power.as_ref());
     report(args, cli, &settings, result, &notes, origin)
+}
+
+/// Predictions for the scans of a data set.
+fn of_data_set(args: &DetectArgs, folder: &Path, cli: &Cli) -> Result<(), Error> {
+    cli.refuse_idle(folder, ON_DATA_SET)?;
+    args.folder
+        .prepare(cli, |files| data_sets::list("detection", None, files))?;
+    let observer = cli.observer();
+    let splits = args.splits.splits();
+    let found = data_sets::predict(
+        folder,
+        &splits,
+        (Stage::Detection, &*observer),
+        |flight, scene, scans| of_flight((args, cli.seed), (flight, scene), scans, &*observer),
+    )?;
+    let of = (Default::default(), found.origin.clone());
+    let list = |files: &mut Outputs| data_sets::list("detection", Some(&found), files);
+    args.folder.finish(cli, of, list, found.report())
+}
+
+/// The best trial wakes of the scans of a flight in which one is found. In a scan that cannot be tested there is none.
+fn of_flight(
+    (args, seed): (&DetectArgs, Option<u64>),
+    (flight, scene): (usize, &SceneFile),
+    scans: Vec<ReadScan>,
+    observer: &dyn Observer,
+) -> Result<Vec<PredictedScan>, Error> {
+    let plan = Plan::new(scene.clone(), Target::Map)?;
+    let (gate, _) = gate_of(None, None, Some(plan.scene()))?;
+    let noise = SceneNoise::new(&plan, &Silent)?;
+    let mut settings = args.settings(seed, Some(plan.scene()), gate);
+    settings.stride = args.stride.unwrap_or(noise.stride);
+    let mut maps = Vec::with_capacity(scans.len());
+    for mut scan in scans {
+        noise.give(&mut scan.map, scan.scans);
+        maps.push(scan.map);
+    }
+    if let Ok((found, _)) = test(&maps, &settings, &Silent) {
+        let of = |found| PredictedScan::from_detection(found, &settings.model);
+        return Ok(found.iter().map(of).collect());
+    }
+    // At least one of them cannot be tested.
+    let mut predicted = Vec::with_capacity(maps.len());
+    for (scan, map) in maps.iter().enumerate() {
+        match test(std::slice::from_ref(map), &settings, &Silent) {
+            Ok((found, _)) => predicted.extend(
+                found
+                    .iter()
+                    .map(|found| PredictedScan::from_detection(found, &settings.model)),
+            ),
+            Err(error @ Error::Estimate(EstimateError::TooFewVelocities { .. })) => {
+                observer.warn(&data_sets::without_wake(flight, scan, &error));
+                predicted.push(PredictedScan::default());
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(predicted)
 }
 
 /// Tests scans for wakes; an error of a single one names its file.
@@ -183,7 +250,7 @@ fn report(
 
 impl DetectArgs {
     /// How wakes are looked for, but for the strides that the noise of a scene asks for.
-    fn settings(&self, cli: &Cli, scene: Option<&Scene>, gate: Gate) -> DetectionSettings {
+    fn settings(&self, seed: Option<u64>, scene: Option<&Scene>, gate: Gate) -> DetectionSettings {
         let height_m = scene.map_or(0.0, |scene| scene.scan.lidar_height_m);
         let lidar_height_m = self.lidar_height.unwrap_or(height_m);
         DetectionSettings {
@@ -201,7 +268,7 @@ impl DetectArgs {
             },
             empty_scans: self.empty_scans as usize,
             stride: self.stride.unwrap_or((1, 1)),
-            seed: cli.seed.or(scene.map(|scene| scene.seed)).unwrap_or(1),
+            seed: seed.or(scene.map(|scene| scene.seed)).unwrap_or(1),
         }
     }
 }

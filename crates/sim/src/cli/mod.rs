@@ -7,6 +7,7 @@ mod accuracy;
 mod args;
 mod bound;
 mod data_files;
+mod data_sets;
 mod dataset;
 mod detect;
 mod estimate;

@@ -27,6 +27,25 @@ pub(super) const ON_SIGNALS: &Idle = &[
 /// On scans of velocities.
 pub(super) const ON_VELOCITIES: &Idle = &[("scale", "it is a factor of raw samples")];
 
+/// On inputs that are no data set.
+pub(super) const WITHOUT_DATA_SET: &Idle = &[("split", "no input is a data set")];
+
+/// Of retrievals from a data set.
+pub(super) const ON_DATA_SET: &Idle = &[
+    ("scene", IN_PLAN),
+    ("estimator", IN_PLAN),
+    ("pulse", IN_PLAN),
+    ("window", IN_PLAN),
+    ("weighting", IN_PLAN),
+    ("gate-std", IN_PLAN),
+    ("field", CELLS),
+    ("towards", CELLS),
+    ("min-snr", CELLS),
+    ("scale", CELLS),
+];
+const IN_PLAN: &str = "the plan of the data set has its instrument";
+const CELLS: &str = "the velocities of a data set are those of its cells";
+
 /// Of a detector of wakes without scans.
 pub(super) const WITHOUT_SCANS: &Idle = &[
     ("field", NO_FILE),

@@ -5,9 +5,10 @@ use super::args::{
     AirArgs, FolderArgs, ScanArgs, Scans, Signals, is_signals, not_negative, positive, refuse_idle,
 };
 use super::data_files::{each_usable, is_of_the_file};
+use super::data_sets::{self, SplitArgs, data_set_of};
 use super::options::{
     BESIDE_GATE_STD, BESIDE_OWN_SCENE, BY_RADIAL_VELOCITIES, ESTIMATOR_BESIDE_GATE_STD, OF_MEANS,
-    WITHOUT_SCENE, refusal_of_idle,
+    ON_DATA_SET, WITHOUT_DATA_SET, WITHOUT_SCENE, refusal_of_idle,
 };
 use crate::detection::scan_turbulence::turbulence_text;
 use crate::io::Provenance;
@@ -17,6 +18,7 @@ use crate::plan::Stage;
 use crate::progress::{Observer, Silent};
 use crate::retrieve::{self, Method, PlaneTrack, RetrievedScan, SceneResponse, gate_of};
 use crate::scene::{Estimator, SceneFile};
+use crate::score::PredictedScan;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use clap::Args;
 use serde_json::json;
@@ -29,7 +31,7 @@ use wakescope_estimate::vortex_fit::{CoreProfile, Secondary, Wake};
 /// Arguments of `wakescope retrieve`.
 #[derive(Debug, Args)]
 pub(super) struct RetrieveArgs {
-    /// Scans (CfRadial, HALO, WindCube, CSV), or raw signals with --scene.
+    /// Scans (CfRadial, HALO, WindCube, CSV), signals with --scene, data set.
     #[arg(required = true)]
     data: Vec<PathBuf>,
     /// Scene of the instrument and estimator; maps of this program contain theirs.
@@ -75,6 +77,8 @@ pub(super) struct RetrieveArgs {
     /// Lidar height above ground in m; by default the scene's, or 0.
     #[arg(long, value_name = "M", value_parser = not_negative)]
     lidar_height: Option<f64>,
+    #[command(flatten)]
+    splits: SplitArgs,
     #[command(flatten)]
     scans: ScanArgs,
     #[command(flatten)]
@@ -226,6 +230,10 @@ struct Found {
 
 pub(super) fn retrieve(args: &RetrieveArgs, cli: &Cli) -> Result<(), Error> {
     args.refuse_idle(cli)?;
+    if let Some(folder) = data_set_of(&args.data)? {
+        return of_data_set(args, folder, cli);
+    }
+    cli.refuse_idle("retrieve", WITHOUT_DATA_SET)?;
     let stated = args
         .scene
         .as_deref()
@@ -273,6 +281,63 @@ pub(super) fn retrieve(args: &RetrieveArgs, cli: &Cli) -> Result<(), Error> {
     )
 }
 
+/// Predictions for the scans of a data set.
+fn of_data_set(args: &RetrieveArgs, folder: &Path, cli: &Cli) -> Result<(), Error> {
+    cli.refuse_idle(folder, ON_DATA_SET)?;
+    if matches!(args.method, Method::Signals | Method::Envelope) {
+        return Err(Error::input(folder, NO_SIGNALS));
+    }
+    args.folder
+        .prepare(cli, |files| data_sets::list("retrieval", None, files))?;
+    let observer = cli.observer();
+    let splits = args.splits.splits();
+    let found = data_sets::predict(
+        folder,
+        &splits,
+        (Stage::Retrieval, &*observer),
+        |flight, scene, scans| of_flight(args, (flight, scene), scans, &*observer),
+    )?;
+    let of = (Default::default(), found.origin.clone());
+    let list = |files: &mut Outputs| data_sets::list("retrieval", Some(&found), files);
+    args.folder.finish(cli, of, list, found.report())
+}
+
+/// The vortices of the scans of a flight, each begun where those before it say that they are. In a scan that cannot be fitted there
+/// are none.
+fn of_flight(
+    args: &RetrieveArgs,
+    (flight, scene): (usize, &SceneFile),
+    scans: Vec<ReadScan>,
+    observer: &dyn Observer,
+) -> Result<Vec<PredictedScan>, Error> {
+    let own = SceneResponse::of_scene(scene, &Silent)?;
+    let velocities = own
+        .as_ref()
+        .map_or(Velocities::Unknown, |own| Velocities::Estimates(own));
+    let (gate, _) = gate_of(None, None, Some(&scene.content))?;
+    let mut before = Vec::new();
+    let mut predicted = Vec::with_capacity(scans.len());
+    for scan in scans {
+        args.refuse_idle_on(&scan, velocities)?;
+        let options = RetrievalOptions {
+            start: prediction(&before, &scan),
+            ..args.options(Some(scene), gate.clone())
+        };
+        match retrieve::retrieve_map(scan, args.method, options, velocities) {
+            Ok((found, _)) => {
+                predicted.push(PredictedScan::from_retrieval(&found.result));
+                before.push(found);
+            }
+            Err(error) if is_of_the_file(&error) => {
+                observer.warn(&data_sets::without_wake(flight, predicted.len(), &error));
+                predicted.push(PredictedScan::default());
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(predicted)
+}
+
 /// Fits the scans of all files, `count` in number; of several those that cannot be fitted are skipped with a warning.
 fn of_inputs(
     args: &RetrieveArgs,
@@ -306,6 +371,10 @@ fn of_inputs(
     }
 }
 
+/// What is said of maps where a method needs signals.
+const NO_SIGNALS: &str =
+    "it is not a file of raw signals, which this method needs: --method fit takes maps";
+
 /// A file, and the scene of its scans where one is known.
 type Input = (Scans, Option<SceneFile>);
 
@@ -331,9 +400,7 @@ fn read_input(
     observer: &dyn Observer,
 ) -> Result<Input, Error> {
     if matches!(args.method, Method::Signals | Method::Envelope) && !is_signals(path) {
-        let reason =
-            "it is not a file of raw signals, which this method needs: --method fit takes maps";
-        return Err(Error::input(path, reason));
+        return Err(Error::input(path, NO_SIGNALS));
     }
     let keeps_spectra = args.method == Method::Envelope;
     let scans = args.scans.read(path, stated, keeps_spectra, observer)?;

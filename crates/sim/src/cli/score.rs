@@ -2,9 +2,9 @@
 
 use super::Cli;
 use super::args::not_negative;
+use super::data_sets::SplitArgs;
 use super::options::WITHOUT_OUTPUT;
 use super::output::paths;
-use crate::io::data_set::Split;
 use crate::io::{Existing, text_file};
 use crate::outputs::Outputs;
 use crate::score::{self, Predictions, Readings, ScoreOptions, Scores, Truth};
@@ -19,15 +19,8 @@ pub(super) struct ScoreArgs {
     data_set: PathBuf,
     /// Predictions (CSV), such as retrieval.csv of the data set.
     predictions: PathBuf,
-    /// Splits to be scored.
-    #[arg(
-        long,
-        value_enum,
-        value_name = "SPLIT,...",
-        value_delimiter = ',',
-        default_value = "test_home,test_away"
-    )]
-    split: Vec<Split>,
+    #[command(flatten)]
+    splits: SplitArgs,
     /// Least circulation of scored vortices in m^2/s.
     #[arg(long, value_name = "M2/S", default_value_t = 50.0, value_parser = not_negative)]
     least: f64,
@@ -52,12 +45,10 @@ pub(super) fn score(args: &ScoreArgs, cli: &Cli) -> Result<(), Error> {
         None => cli.refuse_idle("score", WITHOUT_OUTPUT)?,
     }
     let (truth, data_set) = Truth::read(&args.data_set)?;
-    truth.check_splits(&args.split, &args.data_set)?;
+    let splits = args.splits.splits();
+    data_set.check_splits(&splits)?;
     let mut origin = data_set.origin();
     origin.seed = cli.seed.unwrap_or(origin.seed);
-    let mut splits = args.split.clone();
-    splits.sort_unstable();
-    splits.dedup();
     let options = ScoreOptions {
         splits,
         least_m2_s: args.least,

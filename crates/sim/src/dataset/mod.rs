@@ -20,7 +20,7 @@ pub mod presets;
 pub mod run;
 mod schema;
 
-/// Name of the group of arrays in the folder of a data set.
-pub const STORE: &str = "scans.zarr";
+pub use crate::io::data_set::GROUP as STORE;
+
 /// Name of the plan there.
 pub const PLAN: &str = "plan.toml";

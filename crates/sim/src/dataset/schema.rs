@@ -6,13 +6,11 @@
 
 use super::plan::{DatasetPlan, Flight};
 use crate::Error;
+use crate::io::data_set::Split;
 use crate::io::zarr::Array;
 use crate::measure::recorded::GateSpectra;
 use crate::plan::Plan;
 use serde_json::{Map, Value, json};
-
-/// Names of the splits, by their numbers.
-pub(super) const SPLITS: [&str; 4] = ["train", "validation", "test_home", "test_away"];
 
 /// Step of stored velocities, m/s, and of their standard deviations.
 pub(super) const VELOCITY_STEP_M_S: f64 = 0.005;
@@ -306,7 +304,7 @@ impl Axes<'_> {
             self.of_flights(("site", "uint16"), "", "number of the site")?,
             self.of_flights(("split", "uint8"), "", "split of the data set")?
                 .with("flag_values", json!([0, 1, 2, 3]))
-                .with("flag_meanings", SPLITS.join(" ")),
+                .with("flag_meanings", Split::ALL.map(Split::name).join(" ")),
             self.of_flights(("has_wake", "uint8"), "", "whether an aircraft passes")?,
             self.of_flights(("seed", "int64"), "", "seed of the scene")?,
             self.of_flights(

@@ -131,6 +131,20 @@ impl DataSet {
         self.store.values(name, flights)
     }
 
+    /// Refuses splits of which no flight is ready.
+    ///
+    /// # Errors
+    /// The first such split.
+    pub fn check_splits(&self, splits: &[Split]) -> Result<(), Error> {
+        for split in splits {
+            if !self.splits.contains(&Some(*split)) {
+                let reason = format!("no flight of its split {} is ready", split.name());
+                return Err(Error::input(&self.store.root, reason));
+            }
+        }
+        Ok(())
+    }
+
     /// The plan that it was made from, and its seed.
     #[must_use]
     pub fn origin(&self) -> Provenance {

@@ -30,7 +30,9 @@ mod score_tests;
 
 #[cfg(feature = "plots")]
 pub use pictures::figure;
-pub use predictions::{MOST_VORTICES, PredictedScan, PredictedVortex, Predictions};
+pub use predictions::{
+    MOST_VORTICES, PredictedScan, PredictedVortex, Predictions, prediction_table,
+};
 pub use readings::Readings;
 pub use table::{json, summary, table};
 pub use truth::{TrueFlight, TrueScan, TrueVortex, Truth, VortexValues};

@@ -13,11 +13,15 @@
 use super::truth::{Truth, VortexValues};
 use super::{Quantity, ScoreOptions};
 use crate::Error;
+use crate::detection::ScanDetection;
+use crate::io::Table;
 use crate::io::csv_input::TextTable;
 use crate::keys::one_of;
 use std::collections::BTreeMap;
 use std::path::Path;
-use wakescope_estimate::retrieval::Side;
+use wakescope_estimate::Measured;
+use wakescope_estimate::retrieval::{ScanResult, Side};
+use wakescope_estimate::vortex_fit::WakeModel;
 
 /// Most vortices that may be predicted for a scan: all of their assignments are tried.
 pub const MOST_VORTICES: usize = 100;
@@ -40,6 +44,114 @@ pub struct PredictedScan {
     pub vortices: Vec<PredictedVortex>,
     /// Highest score of the rows, if one states any.
     pub score: Option<f64>,
+}
+
+impl PredictedVortex {
+    /// None where the place or the circulation is not known. Deviations that are not positive are not known.
+    fn new(side: Side, [y_m, z_m, gamma_5_15_m2_s]: [Measured; 3]) -> Option<Self> {
+        let all = [y_m, z_m, gamma_5_15_m2_s];
+        let are_known = all.iter().all(|measured| measured.value.is_finite());
+        let is_known = |std: f64| std > 0.0 && std.is_finite();
+        are_known.then(|| Self {
+            side: Some(side),
+            values: from_array(all.map(|measured| measured.value)),
+            deviations: from_array(all.map(|measured| match is_known(measured.std) {
+                true => measured.std,
+                false => f64::NAN,
+            })),
+        })
+    }
+}
+
+impl PredictedScan {
+    /// The vortices of a retrieval. The score is the excess of its statistic over the threshold.
+    #[must_use]
+    pub fn from_retrieval(result: &ScanResult) -> Self {
+        let vortices = result.vortices.iter().filter_map(|vortex| {
+            let circulation = vortex.circulation_5_15_m2_s;
+            let values = [vortex.lateral_position_m, vortex.height_m, circulation];
+            PredictedVortex::new(vortex.side, values)
+        });
+        Self {
+            vortices: vortices.collect(),
+            score: Some(result.statistic - result.threshold).filter(|score| score.is_finite()),
+        }
+    }
+
+    /// The best trial wake of a test, if it finds one. The score is the excess of its statistic over the threshold, in scales of the
+    /// law of empty scans. Trial wakes lie on a grid, whose step says nothing of their places.
+    #[must_use]
+    pub fn from_detection(found: &ScanDetection, model: &WakeModel) -> Self {
+        let mut vortices = Vec::new();
+        let wake = found.statistic.wake;
+        for (side, vortex) in Side::BOTH.into_iter().zip([wake.left, wake.right]) {
+            if !found.is_wake() || vortex.circulation_m2_s <= 0.0 {
+                continue;
+            }
+            let (share, _) = model.profile.mean_5_15(vortex.core_radius_m);
+            let at = [vortex.lateral_position_m, vortex.height_m];
+            let [y, z] = at.map(|value| Measured {
+                value,
+                std: f64::NAN,
+            });
+            let circulation = Measured {
+                value: share * vortex.circulation_m2_s,
+                std: share * found.statistic.circulation_std_m2_s,
+            };
+            vortices.extend(PredictedVortex::new(side, [y, z, circulation]));
+        }
+        let excess = (found.statistic.value - found.threshold) / found.gumbel.1;
+        Self {
+            vortices,
+            score: Some(excess).filter(|score| score.is_finite()),
+        }
+    }
+}
+
+/// The table that [`Predictions::parse`] reads, of scans by flight and number.
+#[must_use]
+pub fn prediction_table(scans: &[(usize, usize, PredictedScan)]) -> Table {
+    let mut rows: Vec<(usize, usize, Option<&PredictedVortex>, f64)> = Vec::new();
+    for (flight, scan, found) in scans {
+        let score = found.score.unwrap_or(f64::NAN);
+        for vortex in &found.vortices {
+            rows.push((*flight, *scan, Some(vortex), score));
+        }
+        if found.vortices.is_empty() {
+            rows.push((*flight, *scan, None, score));
+        }
+    }
+    let mut table = Table::new()
+        .int("flight", rows.iter().map(|row| row.0 as i64))
+        .int("scan", rows.iter().map(|row| row.1 as i64))
+        .text("side", rows.iter().map(|row| side_name(row.2)));
+    for quantity in Quantity::ALL {
+        let values = rows
+            .iter()
+            .map(|row| known(row.2.map(|vortex| &vortex.values), quantity));
+        let deviations = rows
+            .iter()
+            .map(|row| known(row.2.map(|vortex| &vortex.deviations), quantity));
+        table = table
+            .float(quantity.name(), values)
+            .float(quantity.deviation_name(), deviations);
+    }
+    table.float("score", rows.iter().map(|row| row.3))
+}
+
+/// The side of a vortex, or of none, as rows have it.
+fn side_name(vortex: Option<&PredictedVortex>) -> &'static str {
+    match vortex.map(|vortex| vortex.side) {
+        None => "none",
+        Some(None) => "any",
+        Some(Some(Side::Left)) => "left",
+        Some(Some(Side::Right)) => "right",
+    }
+}
+
+/// A quantity of a vortex; NaN of none.
+fn known(values: Option<&VortexValues>, quantity: Quantity) -> f64 {
+    values.map_or(f64::NAN, |values| values.value(quantity))
 }
 
 /// Predictions of the scans of some splits.
@@ -159,27 +271,29 @@ struct Columns {
 
 impl Columns {
     fn find(table: &TextTable) -> Result<Self, String> {
-        let needed = |name: &str| {
-            table.column(name).ok_or_else(|| {
-                let names = "flight, scan, side, y_m, z_m and gamma_5_15_m2_s";
-                format!("it has no column {name}: predictions have {names}")
-            })
-        };
         let mut values = [0; 3];
         let mut deviations = [None; 3];
         for (index, quantity) in Quantity::ALL.into_iter().enumerate() {
-            values[index] = needed(quantity.name())?;
+            values[index] = needed(table, quantity.name())?;
             deviations[index] = table.column(quantity.deviation_name());
         }
         Ok(Self {
-            flight: needed("flight")?,
-            scan: needed("scan")?,
-            side: needed("side")?,
+            flight: needed(table, "flight")?,
+            scan: needed(table, "scan")?,
+            side: needed(table, "side")?,
             values,
             deviations,
             score: table.column("score"),
         })
     }
+}
+
+/// The index of a column that predictions must have.
+fn needed(table: &TextTable, name: &str) -> Result<usize, String> {
+    table.column(name).ok_or_else(|| {
+        let names = "flight, scan, side, y_m, z_m and gamma_5_15_m2_s";
+        format!("it has no column {name}: predictions have {names}")
+    })
 }
 
 /// One row.
@@ -398,6 +512,43 @@ mod tests {
         let many = "1,0,left,1,50,300,,,\n".repeat(MOST_VORTICES + 1);
         let refused = parse(&many, true).unwrap_err();
         assert!(refused.contains("at most 100 vortices"), "{refused}");
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let known = Measured {
+            value: 1.5,
+            std: 0.25,
+        };
+        let unknown = Measured {
+            value: 50.0,
+            std: 0.0,
+        };
+        let vortex = PredictedVortex::new(Side::Right, [known, unknown, known]).unwrap();
+        assert!(vortex.deviations.z_m.is_nan() && vortex.deviations.y_m == 0.25);
+        let missing = Measured {
+            value: f64::NAN,
+            std: 1.0,
+        };
+        assert_eq!(
+            PredictedVortex::new(Side::Left, [known, known, missing]),
+            None
+        );
+        let without_side = PredictedVortex {
+            side: None,
+            ..vortex
+        };
+        let found = PredictedScan {
+            vortices: vec![vortex, without_side],
+            score: Some(-2.5),
+        };
+        let scans = [(1, 0, found.clone()), (1, 1, PredictedScan::default())];
+        let origin = crate::io::Provenance::new("", "", 1);
+        let text = prediction_table(&scans).to_csv(&origin).unwrap();
+        let read = Predictions::read(&text, &truth(), &ScoreOptions::default()).unwrap();
+        // Numbers that are not known do not compare.
+        assert_eq!(format!("{:?}", read.scans[&(1, 0)]), format!("{found:?}"));
+        assert_eq!(read.scans[&(1, 1)], PredictedScan::default());
     }
 
     #[test]

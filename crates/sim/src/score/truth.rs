@@ -171,21 +171,6 @@ impl Truth {
         Ok((truth, data_set))
     }
 
-    /// Refuses splits of which no flight is ready.
-    ///
-    /// # Errors
-    /// The first such split.
-    pub fn check_splits(&self, splits: &[Split], folder: &Path) -> Result<(), Error> {
-        for split in splits {
-            let mut ready = self.flights.iter().flatten();
-            if !ready.any(|flight| flight.split == *split) {
-                let reason = format!("no flight of its split {} is ready", split.name());
-                return Err(Error::input(folder, reason));
-            }
-        }
-        Ok(())
-    }
-
     /// Mean of a quantity over the scored vortices of the training flights: what a method that sees nothing would predict. NaN
     /// without any.
     #[must_use]

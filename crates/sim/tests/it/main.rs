@@ -12,6 +12,7 @@ mod book;
 #[cfg(feature = "cli")]
 mod cli;
 #[cfg(feature = "cli")]
+mod data_sets;
 mod dataset;
 #[cfg(feature = "cli")]
 mod detection;

@@ -1,6 +1,7 @@
 //! Every option of every command, given with each kind of input that the command takes: it changes
 //! what the command gives, or is refused. An option that is not known here fails the test.
 
+use super::data_sets;
 use super::estimate::{npy, npz, samples};
 use super::score::data_set;
 use super::wakescope;
@@ -135,6 +136,25 @@ const fn some(
 /// Options of the estimator of a file's velocities.
 const OF_ESTIMATOR: &[&str] = &["estimator", "pulse", "window", "weighting"];
 
+/// Options that depend on the scans of a data set.
+const ON_DATA_SET: &[&str] = &[
+    "scene",
+    "estimator",
+    "pulse",
+    "window",
+    "weighting",
+    "gate-std",
+    "scale",
+    "field",
+    "towards",
+    "min-snr",
+    "seed",
+    "method",
+    "threshold",
+    "false-alarm",
+    "stride",
+];
+
 /// Options by which scans are read.
 const OF_READING: &[&str] = &["scale", "field", "towards", "min-snr", "seed", "pulse"];
 
@@ -231,6 +251,13 @@ const KINDS: &[Kind] = &[
         "retrieve",
         "table.csv --turbulence auto --out out",
         &["secondary"],
+    ),
+    some("retrieve", "made --split test_home --out out", ON_DATA_SET),
+    some("retrieve", "made --method rv --out out", &["split"]),
+    some(
+        "detect",
+        "made --split test_home --empty-scans 2000 --spacing 40,60 --out out",
+        ON_DATA_SET,
     ),
     all("wind", "fan.csv --out out"),
     some(
@@ -525,6 +552,10 @@ fn inputs() -> TempDir {
         table(&folder.join("few/map.csv"), false).as_bytes(),
     );
     data_set(&folder.join("d"), None);
+    let small = data_sets::PLAN.replace("sweeps = 2", "sweeps = 1");
+    write("small.toml", small.as_bytes());
+    let out = wakescope(folder, &["dataset", "small.toml", "--out", "made"]);
+    assert!(out.status.success(), "{out:?}");
     let (few, _) = samples(&folder.join("few/signals.nc"));
     write("few.npy", &npy(false, &[few.len() / count, count], &few));
     temp

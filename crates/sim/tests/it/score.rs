@@ -238,7 +238,7 @@ fn what_cannot_be_scored_is_refused_with_its_path_and_writes_nothing() {
     fs::remove_dir_all(folder.join("d/scans.zarr/ready/c")).unwrap();
     let text = score(&["d", "d/p.csv"]);
     assert!(
-        text.contains("d: no flight of its split test_home is ready"),
+        text.contains("d/scans.zarr: no flight of its split test_home is ready"),
         "{text}"
     );
 }

@@ -13,10 +13,12 @@ mod grid;
 mod hpl;
 mod planes;
 mod rays;
+mod store;
 mod table;
 
 pub use planes::{are_of_one_plane, face_alike, plane_numbers};
 pub use rays::{Ray, RaySweep, read_rays};
+pub use store::StoredLines;
 
 use crate::Error;
 use crate::io::netcdf_input::open_groups;
