@@ -247,6 +247,22 @@ struct Stack {
     has_few_cells: bool,
 }
 
+impl Stack {
+    /// How the velocities depend on the components along `axes`, and on their slopes over height where bins are fitted together.
+    fn rows(&self, axes: &[[f64; 3]]) -> Array2<f64> {
+        let count = axes.len();
+        let columns = if self.has_few_cells { 2 * count } else { count };
+        Array2::from_shape_fn((self.used.len(), columns), |(i, j)| {
+            let along = dot(self.used[i].direction, axes[j % count]);
+            if j < count {
+                along
+            } else {
+                along * self.heights[i]
+            }
+        })
+    }
+}
+
 fn stacked(bins: &[Bin], number: usize) -> Stack {
     let range = stack(bins, number);
     let span_m = bins[range.end - 1].height_m - bins[range.start].height_m;
@@ -284,23 +300,12 @@ fn wind_of(
         Determined::WithoutUp => components.axes[..components.axes.len() - 1].to_vec(),
         Determined::None => return Ok(BinWind::Undetermined),
     };
-    let Stack {
-        used,
-        heights,
-        first_own,
-        has_few_cells,
-    } = stacked(bins, number);
+    let stack = stacked(bins, number);
     let count = axes.len();
-    let columns = if has_few_cells { 2 * count } else { count };
-    let rows = Array2::from_shape_fn((used.len(), columns), |(i, j)| {
-        let along = dot(used[i].direction, axes[j % count]);
-        if j < count { along } else { along * heights[i] }
-    });
-    let velocities: Vec<f64> = used.iter().map(|cell| cell.velocity_m_s).collect();
-    let folds_m_s: Vec<f64> = used
-        .iter()
-        .map(|cell| cell.fold_m_s.unwrap_or(f64::INFINITY))
-        .collect();
+    let rows = stack.rows(&axes);
+    let velocities: Vec<f64> = stack.used.iter().map(|cell| cell.velocity_m_s).collect();
+    let folds = stack.used.iter().map(|cell| cell.fold_m_s);
+    let folds_m_s: Vec<f64> = folds.map(|fold| fold.unwrap_or(f64::INFINITY)).collect();
     let data = RadialVelocities {
         rows: rows.view(),
         velocity_m_s: &velocities,
@@ -309,7 +314,7 @@ fn wind_of(
     };
     let start_m_s = below_m_s.filter(|start| start.len() == count).map(|start| {
         let mut start = start.to_vec();
-        start.resize(columns, 0.0);
+        start.resize(rows.ncols(), 0.0);
         start
     });
     let Some(mut fit) = fit_mixture(&data, start_m_s.as_deref())? else {
@@ -325,10 +330,10 @@ fn wind_of(
     Ok(BinWind::Found(Box::new(FoundWind {
         gain: gain.slice(s![..count, ..]).to_owned(),
         has_no_up: count < components.axes.len(),
-        has_few_cells,
+        has_few_cells: stack.has_few_cells,
         axes,
         fit,
-        used,
-        first_own,
+        used: stack.used,
+        first_own: stack.first_own,
     })))
 }
