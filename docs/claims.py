@@ -404,6 +404,22 @@ def ap1():
     return found
 
 
+def of_cones(number):
+    """A number of the scans of each dissipation rate, with its standard error from leaving out one scan at a time."""
+    of_rate = {}
+    for row in rows("fig23"):
+        of_rate.setdefault(row["dissipation_m2_s3"], []).append(row)
+    return [words(estimate(len(scans), lambda b, r=rate, s=scans: number(r, s, b))) for rate, scans in of_rate.items()]
+
+
+def ka1():
+    return of_cones(lambda rate, scans, b: mean([scan["eps23_m43_s2"] for scan in scans], b) / rate ** (2 / 3))
+
+
+def ka2():
+    return of_cones(lambda rate, scans, b: math.sqrt(mean([scan["reduced_square"] for scan in scans], b)))
+
+
 CLAIMS = {
     "T1": t1, "F1b": f1b, "F4a": f4a, "F4b": f4b, "F4c": f4c, "F4d": f4d, "F6a": f6a, "F6b": f6b, "F7d": f7d, "F7e": f7e, "F8": f8,
     "F9b": f9b, "F10": f10, "F12a": f12a, "F12b": f12b, "F12c": f12c, "F13": f13, "F14a": f14a, "F14b": f14b,
@@ -412,7 +428,7 @@ CLAIMS = {
     "F17i": lambda: retrieved("simulated wake, tau = 2.5", "fit"), "F17j": lambda: retrieved("simulated wake, tau = 4", "fit"),
     "F18a": lambda: over_bound(0.0, 15.0), "F18b": lambda: over_bound(-5.0, 20.0), "F18c": lambda: bad(20), "F18d": lambda: bad(60),
     "F16b": f16b, "F19a": f19a,
-    "CP1": cp1, "CP2": cp2, "CP3": cp3, "CP4": cp4, "CP5": cp5, "CP6": cp6, "AP1": ap1,
+    "CP1": cp1, "CP2": cp2, "CP3": cp3, "CP4": cp4, "CP5": cp5, "CP6": cp6, "AP1": ap1, "KA1": ka1, "KA2": ka2,
 }  # fmt: skip
 MEASURED = {row["id"]: row["measured"] for row in rows("claims")}
 

@@ -21,6 +21,7 @@ mod fig17;
 pub(crate) mod fig17_flows;
 mod fig18;
 mod fig19;
+mod fig23;
 mod fig25;
 mod fig26;
 mod profiles;
@@ -148,7 +149,7 @@ const fn figure(
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 22] = [
+pub(crate) const ALL: [Figure; 23] = [
     figure(
         "fig01",
         1,
@@ -258,6 +259,14 @@ pub(crate) const ALL: [Figure; 22] = [
     )
     .with_row(0, 3),
     figure("fig19", 19, "Detection of wakes", 10.5, fig19::make),
+    figure(
+        "fig23",
+        23,
+        "Turbulence and wind from cones",
+        12.0,
+        fig23::make,
+    )
+    .with_row(0, 2),
     figure(
         "fig25",
         25,

@@ -21,7 +21,7 @@ use crate::run::RunResult;
 #[cfg(feature = "plots")]
 use crate::scene::Pattern;
 use crate::scene::{DetectorSignal, NoiseModel};
-use crate::wind::{table_with_truth, winds_of_map};
+use crate::wind::{WindOptions, table_with_truth, winds_of_map};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -104,7 +104,7 @@ fn list_estimates(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resul
     let map = estimates.map(|estimates| velocity_map(plan, estimates));
     list_map(plan, map.as_ref(), files)?;
     let winds = match &map {
-        Some(map) => winds_of_map(plan, map)?,
+        Some(map) => winds_of_map(plan, map, &WindOptions::of_scene(plan.scene())?)?,
         None => None,
     };
     if pattern.has_beam_winds() {

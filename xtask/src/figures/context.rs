@@ -8,7 +8,7 @@ use wakescope_sim::io::{FileGroup, Provenance};
 // What figures are made of.
 pub(super) use crate::claim::{Claim, Part};
 pub(super) use crate::profile::Profile;
-pub(super) use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE};
+pub(super) use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE, mean};
 pub(super) use fixtures::failure::Failure;
 pub(super) use ndarray::Array2;
 pub(super) use wakescope_les::analysis::decay::value_at;

@@ -3,7 +3,6 @@
 //! Check: a scan of one realisation has the winds of its own `map.nc`; the truth of linear winds.
 
 use super::{Every, WindOptions, WindProfiles, Window, table, wind_profiles, windows};
-use crate::Error;
 use crate::beams::Direction;
 use crate::io::Table;
 use crate::io::map::VelocityMap;
@@ -11,6 +10,7 @@ use crate::io::scans::{Ray, RaySweep};
 use crate::plan::Plan;
 use crate::retrieve::gate_of_instrument;
 use crate::scene::Scene;
+use crate::{Error, SPEED_OF_LIGHT_M_S};
 use std::f64::consts::FRAC_PI_2;
 
 /// Winds of a scan and of the air.
@@ -38,23 +38,33 @@ impl WindOptions {
     }
 }
 
-/// Gates this many apart share no samples.
+/// Gates this many apart share no air: neither samples of the windows of their regions nor scatterers of one pulse, whose speckle
+/// correlates their errors as eddies would.
 pub(crate) fn gate_stride(scene: &Scene) -> usize {
-    let step = scene.estimator.gate_step_samples.max(1);
-    scene.estimator.window_samples.div_ceil(step)
+    let estimator = &scene.estimator;
+    let sampling_hz = scene.detector.sampling_hz;
+    let sample_m = 0.5 * SPEED_OF_LIGHT_M_S / sampling_hz;
+    let region = 2.0 * estimator.largest_radius_m(scene.scan.range_max_m) / sample_m;
+    let pulse = scene.pulse_width_s() * sampling_hz;
+    let samples = estimator.window_samples as f64 + region + pulse;
+    (samples / estimator.gate_step_samples.max(1) as f64).ceil() as usize
 }
 
-/// The winds of a scan whose beams determine them, VAD and DBS; a window for each sweep.
+/// The winds of a scan whose beams determine them, VAD and DBS; a window for each sweep. The options of its own scene are
+/// [`WindOptions::of_scene`].
 ///
 /// # Errors
 /// What the fits or the wind refuse; a checked scene gives none.
-pub fn winds_of_map(plan: &Plan, map: &VelocityMap) -> Result<Option<MapWinds>, Error> {
+pub fn winds_of_map(
+    plan: &Plan,
+    map: &VelocityMap,
+    options: &WindOptions,
+) -> Result<Option<MapWinds>, Error> {
     if !plan.scene().scan.pattern.has_beam_winds() {
         return Ok(None);
     }
     let (windows, reference, _) = windows(ray_sweeps(map), Every::Sweep)?;
-    let options = WindOptions::of_scene(plan.scene())?;
-    let profiles = wind_profiles(&windows, reference, &options)?;
+    let profiles = wind_profiles(&windows, reference, options)?;
     let true_m_s = true_winds_m_s(plan, map, &windows, &profiles)?;
     Ok(Some(MapWinds { profiles, true_m_s }))
 }

@@ -7,7 +7,7 @@ use wakescope_sim::io::Existing;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::scene::SceneFile;
-use wakescope_sim::wind::winds_of_map;
+use wakescope_sim::wind::{WindOptions, winds_of_map};
 use wakescope_sim::write::{velocity_map, write};
 use wakescope_sim::{Error, Silent, run};
 
@@ -242,7 +242,11 @@ fn vad_and_dbs_of_a_scan_determine_the_wind_with_its_standard_errors() {
     ] {
         let plan = plan(uniform, scan);
         let map = map(&plan);
-        let found = winds_of_map(&plan, &velocity_map(&plan, &map));
+        let found = winds_of_map(
+            &plan,
+            &velocity_map(&plan, &map),
+            &WindOptions::of_scene(plan.scene()).unwrap(),
+        );
         let winds = found.unwrap().unwrap();
         assert_eq!(winds.profiles.rows.len(), 2 * map.range_m.len());
         // White noise on the beams of a cone, in the horizontal components.
