@@ -24,6 +24,7 @@ use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::scan::PulseKey;
 use wakescope_signal::{LineOfSight, RangeFilter, Record, Scan, Shot, Simulator};
 
+mod layers;
 pub(crate) mod products;
 
 /// Size of a piece of records, bytes.
@@ -56,6 +57,8 @@ pub struct ScanAir {
     pub(crate) wind: Arc<SceneWind>,
     /// The air of each line, in the order of the geometry's elevations: that of its middle, or the mean of the winds of its pulses.
     pub lines: Vec<LineOfSight>,
+    /// The air of the signals of lines that need no layers as thin as those; none where all do.
+    thick: Vec<Option<LineOfSight>>,
     /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the pulses
     /// have winds of their own.
     pub spread_m_s: Option<Array2<f64>>,
@@ -94,12 +97,26 @@ impl ScanAir {
         let spread_m_s =
             spreads.and_then(|values| Array2::from_shape_vec(shape, values.concat()).ok());
         let previous = previous_air(plan, &wind, &lines)?;
+        let is_alone = spread_m_s.is_none() && previous.is_none();
+        let thick = match is_alone && drawn_turbulence(plan.scene()).is_none() {
+            true => layers::thick_lines(plan, &lines)?,
+            false => Vec::new(),
+        };
         Ok(Self {
+            thick,
             wind,
             lines,
             spread_m_s,
             previous,
         })
+    }
+}
+
+impl ScanAir {
+    /// The air of the signals of a line.
+    fn of_signals(&self, line: usize) -> &LineOfSight {
+        let thick = self.thick.get(line).and_then(Option::as_ref);
+        thick.unwrap_or(&self.lines[line])
     }
 }
 
@@ -268,7 +285,7 @@ impl<'a> Scanner<'a> {
                 let impairment_seed =
                     stream(self.plan.scene().seed, "asides", index(key) as u64).next_u64();
                 Shot {
-                    line: lines.get(key.pulse).unwrap_or(&air.lines[line]),
+                    line: lines.get(key.pulse).unwrap_or(air.of_signals(line)),
                     efficiency,
                     previous,
                     impairment_seed,

@@ -23,6 +23,8 @@ pub struct Geometry {
     pub samples: usize,
     /// Distance between samples c T_s/2, m.
     pub sample_spacing_m: f64,
+    /// Range of the first sample, m.
+    pub first_sample_m: f64,
     /// Range of each gate of the map, that is of the centre of its window, m.
     pub gate_range_m: Vec<f64>,
     /// Thickness of the scattering layers, m.
@@ -79,6 +81,7 @@ impl Geometry {
             line_time_s,
             samples,
             sample_spacing_m,
+            first_sample_m: scan.range_min_m,
             gate_range_m: first_samples.map(centre_m).collect(),
             layer_thickness_m,
             first_layer_range_m: scan.range_min_m - near as f64 * layer_thickness_m,
