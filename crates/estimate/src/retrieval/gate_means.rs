@@ -72,7 +72,10 @@ fn fit_unfolded(
         *start = unfolded.with_wind(start);
     }
     let nothing = unfolded.with_wind(&Wake::from_array(&CALM));
-    let about = starts.first().map_or(nothing, |s| s.1);
+    // A start may be impossible: a track that is continued may lead below the ground.
+    let mut possible = starts.iter().map(|start| start.1);
+    let about = possible.find(|wake| search.wind(wake).is_ok());
+    let about = about.unwrap_or(nothing);
     if map.sigma_m_s.is_none() {
         // what the wind leaves, until fits are known
         let winds = (search.wind(&about)?, all.wind(&about)?);

@@ -501,6 +501,22 @@ fn exact_scans_give_the_truth_to_a_thousandth_of_the_bound() {
 }
 
 #[test]
+fn an_impossible_start_is_passed_over() {
+    let mut case = case("b");
+    let errors = |case: &Case| {
+        let found = fit_scan(&case.map, Velocities::Means, &case.options);
+        errors_over_bounds(case, &found.unwrap().result)
+    };
+    let blind = errors(&case);
+    // Below the ground, where the model has no vortices.
+    let below = [300.0, 300.0, 381.0, -5.0, 419.0, -5.0, 3.0, 3.0, -4.0, 0.03];
+    case.options.start = Some(Wake::from_array(&below));
+    for (a, b) in errors(&case).iter().zip(&blind) {
+        assert!((a - b).abs() < 0.05, "{a} {b}");
+    }
+}
+
+#[test]
 fn stored_scans_are_within_three_bounds_of_the_truth_whether_the_wake_moves_or_not() {
     for name in ["a", "b", "c"] {
         let case = case(name);

@@ -72,7 +72,7 @@ impl FolderArgs {
 /// What is known of the air and of the gates.
 #[derive(Debug, Args)]
 pub(super) struct AirArgs {
-    /// Turbulence: auto (found in each scan), or deviation, length (m/s, m); by default none.
+    /// Turbulence: auto, or deviation and length (m/s, m); default none.
     #[arg(long, value_name = "auto|SIGMA,LENGTH", value_parser = turbulence)]
     pub(super) turbulence: Option<Turbulence>,
     /// Standard deviation of the gate's range weighting in m; 0 for points.
