@@ -333,8 +333,10 @@ fn is_wind(file: &str, truth: &Value, row: &Row) -> bool {
         is_found = true;
         let at_m = number(row, "height_m");
         let expected = at_height(&height_m, &floats(&of_method[component]), at_m);
+        // Turbulence has hundreds of winds, of which one may be beyond three standard errors.
+        let errors = if has_eddies { 4.0 } else { 3.0 };
         let allowed = match by_errors {
-            true => 3.0 * number(row, &format!("{column}_std_m_s")) + WIND_M_S,
+            true => errors * number(row, &format!("{column}_std_m_s")) + WIND_M_S,
             false => WIND_M_S,
         };
         let off = found - expected;
