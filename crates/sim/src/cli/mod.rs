@@ -265,10 +265,8 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
             out,
             overwrite,
             allow_large,
-        } => {
-            let plan = bound::plan(scene, *allow_large, cli)?;
-            bound::bound(&plan, out.as_deref(), *overwrite, cli)
-        }
+        } => bound::plan(scene, *allow_large, cli)
+            .and_then(|plan| bound::bound(&plan, out.as_deref(), *overwrite, cli)),
         Command::Budget {
             scene,
             range,
@@ -284,10 +282,8 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
             merge,
             settings,
             out,
-        } => {
-            let cases = sweep::cases(scene.as_deref(), request, cli)?;
-            sweep::sweep(cases.as_ref(), merge, out, *settings, cli)
-        }
+        } => sweep::cases(scene.as_deref(), request, cli)
+            .and_then(|cases| sweep::sweep(cases.as_ref(), merge, out, *settings, cli)),
         Command::Dataset(args) => dataset::dataset(args, cli),
         Command::Flow { case, run, example } => {
             flow::flow(example.as_deref(), case.as_deref(), run, cli)
@@ -295,12 +291,12 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
         Command::Wake {
             case,
             preset,
-            print: true,
+            print,
             run,
-        } => flow::print_wake(case.as_deref(), *preset, run.end, cli),
-        Command::Wake {
-            case, preset, run, ..
-        } => flow::wake(case.as_deref(), *preset, run, cli),
+        } => match print {
+            true => flow::print_wake(case.as_deref(), *preset, run.end, cli),
+            false => flow::wake(case.as_deref(), *preset, run, cli),
+        },
     }?;
     Ok(0)
 }
