@@ -308,7 +308,7 @@ fn hold_wind(ledger: &mut Ledger, bench: &Bench, s: &Scene) {
                 &format!("wind.csv: {name}"),
                 f(&name),
                 right,
-                0.2 + 6.0 * std,
+                0.1 + 5.0 * std,
             );
         }
     }

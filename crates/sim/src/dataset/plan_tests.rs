@@ -220,25 +220,28 @@ fn keys_that_are_not_allowed_are_refused_with_their_line_and_what_is() {
         ),
     ] {
         let head_only = head == "scene = 3";
-        let told = match head_only {
+        let refusal = match head_only {
             true => plan("title = \"t\"\nscene = 3\n").unwrap_err().to_string(),
             false => message(head, tables),
         };
-        assert!(told.contains(wanted), "{head} {tables}: {told}");
+        assert!(refusal.contains(wanted), "{head} {tables}: {refusal}");
     }
     for flights in ["7", "12", "131072"] {
         let text = with("", "").replace(
             "flights_per_site = 8",
             &format!("flights_per_site = {flights}"),
         );
-        let told = plan(&text).unwrap_err().to_string();
-        assert!(told.contains("more flights need more sites"), "{told}");
+        let refusal = plan(&text).unwrap_err().to_string();
+        assert!(
+            refusal.contains("more flights need more sites"),
+            "{refusal}"
+        );
     }
     let many: String = (0..255)
         .map(|i| format!("\"added_flows.{i}.dissipation_m2_s3\" = {{ uniform = [0.0, 1.0] }}\n"))
         .collect();
-    let told = message("", &format!("[flight]\n{many}"));
-    assert!(told.contains("at most 254 distributions"), "{told}");
+    let refusal = message("", &format!("[flight]\n{many}"));
+    assert!(refusal.contains("at most 254 distributions"), "{refusal}");
     assert!(
         plan(&with("", "").replace("title = \"t\"\n", ""))
             .unwrap_err()

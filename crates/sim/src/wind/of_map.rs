@@ -3,7 +3,7 @@
 //! Check: a scan of one realisation has the winds of its own `map.nc`; the truth of linear winds.
 
 use super::{Every, WindOptions, WindProfiles, Window, table, wind_profiles, windows};
-use crate::beams::Direction;
+use crate::beams::{Direction, Schedule};
 use crate::io::Table;
 use crate::io::map::VelocityMap;
 use crate::io::scans::{Ray, RaySweep};
@@ -63,14 +63,14 @@ pub fn winds_of_map(
     if !plan.scene().scan.pattern.has_beam_winds() {
         return Ok(None);
     }
-    let (windows, reference, _) = windows(ray_sweeps(map), Every::Sweep)?;
+    let (windows, reference, _) = windows(ray_sweeps(&plan.geometry.schedule, map), Every::Sweep)?;
     let profiles = wind_profiles(&windows, reference, options)?;
     let true_m_s = true_winds_m_s(plan, map, &windows, &profiles)?;
     Ok(Some(MapWinds { profiles, true_m_s }))
 }
 
 /// The lines of sight of the first realisation.
-fn ray_sweeps(map: &VelocityMap) -> Vec<RaySweep> {
+fn ray_sweeps(schedule: &Schedule, map: &VelocityMap) -> Vec<RaySweep> {
     let mut sweeps = Vec::with_capacity(map.sweeps.len());
     for sweep in 0..map.sweeps.len() {
         sweeps.push(RaySweep {
@@ -83,7 +83,13 @@ fn ray_sweeps(map: &VelocityMap) -> Vec<RaySweep> {
     let Some(field) = map.field("v_scan") else {
         return sweeps;
     };
-    for (ray, velocity_m_s) in map.rays.iter().zip(field.values.rows()) {
+    for (line, ray) in map.rays.iter().enumerate() {
+        // Velocities are relative to the lidar.
+        let beam = schedule.middle(line);
+        let own_m_s = -beam
+            .direction
+            .radial_velocity_m_s([0.0; 3], beam.velocity_m_s);
+        let velocity_m_s = field.values.row(line).mapv(|seen_m_s| seen_m_s + own_m_s);
         sweeps[ray.sweep].rays.push(Ray {
             azimuth_rad: ray.azimuth_rad,
             elevation_rad: ray.elevation_rad,
@@ -107,11 +113,13 @@ fn true_winds_m_s(
     let x_axis_rad = map.flight.map_or(FRAC_PI_2, |(_, azimuth_rad)| azimuth_rad);
     let east = Direction::new(FRAC_PI_2 - x_axis_rad, 0.0).0;
     let north = Direction::new(-x_axis_rad, 0.0).0;
-    let lidar_m = plan.geometry.schedule.mount.position_m;
+    let bounds = map.sweep_bounds();
     let mut winds_m_s = Vec::with_capacity(profiles.rows.len());
     for row in &profiles.rows {
         let rays = &windows[row.window - 1].rays;
         let time_s = rays.iter().map(|ray| ray.time_s).sum::<f64>() / rays.len() as f64;
+        let (first, _) = bounds[row.window - 1];
+        let lidar_m = plan.geometry.schedule.middle(first).position_m;
         let above_m = [lidar_m[0], lidar_m[1], lidar_m[2] + row.height_m];
         let mut found = [[f64::NAN; 3]];
         let air = plan.wind.without_eddies();

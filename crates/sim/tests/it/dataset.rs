@@ -36,17 +36,17 @@ fn words<'a>(more: &[&'a str]) -> Vec<&'a str> {
 
 fn ran(folder: &Path, more: &[&str]) -> String {
     let out = wakescope(folder, &words(more));
-    let told = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success(), "{more:?}: {told}");
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{more:?}: {text}");
     String::from_utf8(out.stdout).unwrap()
 }
 
 /// What a refused command tells.
 fn refused(folder: &Path, more: &[&str]) -> String {
     let out = wakescope(folder, &words(more));
-    let told = String::from_utf8_lossy(&out.stderr).into_owned();
-    assert_eq!(out.status.code(), Some(2), "{more:?}: {told}");
-    told
+    let text = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert_eq!(out.status.code(), Some(2), "{more:?}: {text}");
+    text
 }
 
 /// Paths of all files below a folder with their contents.
@@ -216,49 +216,49 @@ fn plans_and_folders_that_cannot_be_are_refused_and_nothing_is_written() {
         ),
         (&["--out", "p.toml/d"], "p.toml"),
     ] {
-        let told = refused(at, more);
-        assert!(told.contains(wanted), "{more:?}: {told}");
+        let text = refused(at, more);
+        assert!(text.contains(wanted), "{more:?}: {text}");
     }
     let sweeps = PLAN.replace(
         "head = { sweeps = 3 }",
         "head = { sweeps = 3, direction = \"alternate\" }",
     );
     std::fs::write(at.join("p.toml"), sweeps).unwrap();
-    let told = refused(at, &["--out", "d"]);
+    let text = refused(at, &["--out", "d"]);
     assert!(
-        told.contains("the same lines") && told.contains("flight "),
-        "{told}"
+        text.contains("the same lines") && text.contains("flight "),
+        "{text}"
     );
     let few_lags = PLAN.replace(
         "[scene.estimator]\n",
         "[scene.estimator]\nweighting = \"rectangular\"\nmethod = { kind = \"autoregressive\", order = 4 }\n",
     );
     std::fs::write(at.join("p.toml"), few_lags).unwrap();
-    let told = refused(at, &["--out", "d"]);
-    assert!(told.contains("spectra need the correlogram"), "{told}");
+    let text = refused(at, &["--out", "d"]);
+    assert!(text.contains("spectra need the correlogram"), "{text}");
     assert_eq!(names(at), ["p.toml"]);
     std::fs::write(at.join("p.toml"), PLAN).unwrap();
     ran(at, &["--out", "d", "--flights", "1"]);
     let before = tree(&at.join("d"));
-    let told = refused(at, &["--out", "d"]);
+    let text = refused(at, &["--out", "d"]);
     assert!(
-        told.contains("ready/c/0") && told.contains("--resume"),
-        "{told}"
+        text.contains("ready/c/0") && text.contains("--resume"),
+        "{text}"
     );
-    let told = refused(at, &["--out", "d", "--resume", "--seed", "2"]);
-    assert!(told.contains("seed is 1 there, 2 here"), "{told}");
+    let text = refused(at, &["--out", "d", "--resume", "--seed", "2"]);
+    assert!(text.contains("seed is 1 there, 2 here"), "{text}");
     std::fs::create_dir_all(at.join("other/scans.zarr/kept")).unwrap();
-    let told = refused(at, &["--out", "other", "--overwrite"]);
+    let text = refused(at, &["--out", "other", "--overwrite"]);
     assert!(
-        told.contains("no Zarr group that --overwrite may replace"),
-        "{told}"
+        text.contains("no Zarr group that --overwrite may replace"),
+        "{text}"
     );
     assert!(tree(&at.join("d")) == before);
     let version = std::fs::read_to_string(at.join("d/scans.zarr/zarr.json")).unwrap();
     let other = version.replace("\"program\": \"wakescope ", "\"program\": \"wakescope 9");
     std::fs::write(at.join("d/scans.zarr/zarr.json"), other).unwrap();
-    let told = refused(at, &["--out", "d", "--resume"]);
-    assert!(told.contains("program is"), "{told}");
+    let text = refused(at, &["--out", "d", "--resume"]);
+    assert!(text.contains("program is"), "{text}");
 }
 
 /// A limit on the size of files stands for a full disk.
@@ -277,11 +277,11 @@ fn a_disk_that_is_full_leaves_whole_chunks_and_a_resumed_run_goes_on() {
         .current_dir(at)
         .output()
         .unwrap();
-    let told = String::from_utf8_lossy(&out.stderr);
-    assert_eq!(out.status.code(), Some(2), "{told}");
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(2), "{text}");
     assert!(
-        told.contains("cannot write d/") && told.contains("File too large"),
-        "{told}"
+        text.contains("cannot write d/") && text.contains("File too large"),
+        "{text}"
     );
     for (path, content) in tree(&at.join("d")) {
         assert!(

@@ -239,6 +239,10 @@ fn vad_and_dbs_of_a_scan_determine_the_wind_with_its_standard_errors() {
             "pattern = { kind = \"dbs\", elevation_rad = 1.1 }\nhead.sweeps = 2",
             4.0f64,
         ),
+        (
+            "pattern = { kind = \"vad\", elevation_rad = 1.1, beams = 24 }\nhead.sweeps = 2\nlidar.velocity_m_s = [5.0, 2.0, 0.0]",
+            24.0,
+        ),
     ] {
         let plan = plan(uniform, scan);
         let map = map(&plan);

@@ -1,8 +1,8 @@
 //! Layers of the signals of a line: as thick as its own steepest wind allows.
 //!
 //! The layers of a scan are as thin as its steepest wind needs, which only lines near a vortex core meet. Signals of the other lines
-//! have fewer layers of the same air: every k-th, so that layers still divide the distance of samples. Scenes whose pair is not
-//! transported keep the layers of released versions, and so their bytes.
+//! have fewer layers of the same air: every k-th, so that layers still divide the distance of samples. Only scenes with a
+//! transported pair have them: signals of others keep their stored values.
 //!
 //! Check: thick layers have the air of the thin ones; errors of a map with thick layers are those with thin ones.
 

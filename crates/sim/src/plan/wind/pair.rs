@@ -351,7 +351,8 @@ mod tests {
             squares_m2 += meandered_m(seed, None).powi(2);
         }
         let rms_m = (squares_m2 / SEEDS as f64).sqrt();
-        eprintln!("{rms_m:.2} m");
+        let error_m = rms_m / (2.0 * SEEDS as f64).sqrt();
+        eprintln!("{rms_m:.1} +- {error_m:.1} m");
         assert!((rms_m - 14.0).abs() < 4.0, "{rms_m}");
     }
 
