@@ -28,7 +28,8 @@ pub struct PulseKey {
 }
 
 /// A random generator for one pulse: its 256 bits of state are four hashes (SplitMix64) of seed,
-/// line and pulse, so that neighbouring keys and seeds have unrelated streams.
+/// line and pulse, so that neighbouring keys and seeds have unrelated streams. For programs that use this crate alone:
+/// `wakescope run` has generators of its own.
 pub fn pulse_generator(seed: u64, key: PulseKey) -> Xoshiro256PlusPlus {
     const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
     let mut state = [0; 32];

@@ -59,7 +59,8 @@ pub struct VortexResult {
     pub time_s: f64,
     /// Circulation \[m^2/s\].
     pub circulation_m2_s: Measured,
-    /// Its mean over radii of 5 to 15 m \[m^2/s\].
+    /// Its mean over radii of 5 to 15 m \[m^2/s\]. Its standard deviation follows from the covariance of the fit: noise, the
+    /// correlation of neighbours, the core; and from other minima: the other profile and, for long gates, other spacings.
     pub circulation_5_15_m2_s: Measured,
     /// Lateral coordinate of the centre \[m\].
     pub lateral_position_m: Measured,

@@ -402,11 +402,39 @@ fn is_plus_one(source: &dyn VariableSource, name: &str) -> bool {
 }
 
 fn says_plus_one(text: &str) -> bool {
+    says(
+        text,
+        &["ratio+1", "snr+1", "1+snr", "cnr+1", "plus1", "plusone"],
+    )
+}
+
+/// Whether velocities are positive towards the instrument: by the standard name, or by a remark.
+pub(crate) fn is_towards(source: &dyn VariableSource, name: &str) -> bool {
+    let attribute = |attribute| source.attribute(name, attribute).unwrap_or_default();
+    if attribute("standard_name") == TOWARDS || says(attribute("positive"), &["toward"]) {
+        return true;
+    }
+    ["long_name", "comment", "description"]
+        .iter()
+        .any(|remark| says_positive_towards(attribute(remark)))
+}
+
+fn says_positive_towards(text: &str) -> bool {
+    let towards = [
+        "positivetoward",
+        "positiveistoward",
+        "positivevaluestoward",
+        "positivevaluesaretoward",
+        "positivemeanstoward",
+    ];
+    says(text, &towards) && !says(text, &["positiveaway", "awaypositive", "awayispositive"])
+}
+
+/// Whether a text has one of these forms, whatever its case, blanks and other signs.
+fn says(text: &str, forms: &[&str]) -> bool {
     let mut plain = text.to_ascii_lowercase();
     plain.retain(|c| c.is_ascii_alphanumeric() || c == '+');
-    ["ratio+1", "snr+1", "1+snr", "cnr+1", "plus1", "plusone"]
-        .iter()
-        .any(|form| plain.contains(form))
+    forms.iter().any(|form| plain.contains(form))
 }
 
 /// Noise alone has a ratio plus 1 of about 1: where most are far below, the variable is something else.

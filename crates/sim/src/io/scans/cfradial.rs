@@ -10,8 +10,8 @@ use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::netcdf_input::NetcdfFile;
 use crate::io::units::Quantity;
 use crate::io::variable::{
-    self, AZIMUTH, ELEVATION, NYQUIST, PULSE_WIDTH, RANGE, RATIO, SIGMA, TOWARDS, TRANSITION,
-    Times, VELOCITY, VariableNames, ZENITH,
+    self, AZIMUTH, ELEVATION, NYQUIST, PULSE_WIDTH, RANGE, RATIO, SIGMA, TRANSITION, Times,
+    VELOCITY, VariableNames, ZENITH,
 };
 use crate::io::{UtcTime, cfradial::MIRRORED};
 use crate::machine;
@@ -377,7 +377,7 @@ impl VelocityVariable {
                 .map(str::to_owned)
                 .ok_or("it has no radial velocity: none of its variables has that standard name or a usual name; --field names it")?,
         };
-        let is_towards = file.text(&name, "standard_name") == Some(TOWARDS) || format.towards;
+        let is_towards = variable::is_towards(file, &name) || format.towards;
         let is_mean = file
             .text(&name, "cell_methods")
             .is_some_and(|methods| methods.contains("realization: mean"));

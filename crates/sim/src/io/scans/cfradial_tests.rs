@@ -185,6 +185,21 @@ fn sign_folds_masks_and_ragged_gates_follow_the_file() {
         ),
     );
     assert_eq!(read(&towards).unwrap().0.remove(0).map.fold_m_s, None);
+    // A remark says as much as the standard name.
+    for (attribute, remark, velocity_m_s) in [
+        ("positive", "towards", -3.5),
+        ("long_name", "velocity, positive towards the lidar", -3.5),
+        ("comment", "away: positive, toward: negative", 3.5),
+        ("comment", "negative towards the lidar", 3.5),
+    ] {
+        let mut remarked = made();
+        let (shape, _, values) = remarked.0.remove("VEL").unwrap();
+        remarked
+            .0
+            .insert("VEL", (shape, vec![(attribute, remark)], values));
+        let found = read(&remarked).unwrap().0.remove(0).map;
+        assert_eq!(found.velocity_m_s[[4, 5]], velocity_m_s, "{remark}");
+    }
     // The same gates one ray after the other, the last gate of the first ray missing.
     let mut ragged = made();
     let own = values
