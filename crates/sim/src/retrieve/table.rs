@@ -242,7 +242,7 @@ pub fn flags(result: &ScanResult) -> String {
     result.flags.iter().map(name).collect::<Vec<_>>().join(" ")
 }
 
-/// Everything that was found, with covariances and competing tops.
+/// Everything that was found, with covariances and competing minima of chi-square.
 pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
     let scans = scans.iter().enumerate();
     Value::Array(scans.map(|(i, scan)| scan_json(i + 1, scan)).collect())
@@ -256,9 +256,9 @@ fn scan_json(number: usize, scan: &RetrievedScan) -> Value {
     let secondary = scan.options.model.secondary.map(|both| both.map(|v| json!({
         "gamma_m2_s": v.circulation_m2_s, "y_m": v.lateral_position_m, "z_m": v.height_m, "core_m": v.core_radius_m,
     })));
-    let tops = r.tops.iter();
-    let tops: Vec<Value> = tops
-        .map(|top| json!({ "wake": wake_json(&top.wake), "chi2": top.chi2 }))
+    let minima = r.tops.iter();
+    let minima: Vec<Value> = minima
+        .map(|minimum| json!({ "wake": wake_json(&minimum.wake), "chi2": minimum.chi2 }))
         .collect();
     let mut object = json!({
         "scan": number, "file": scan.scan.path.to_string_lossy(), "sweep": scan.scan.sweep, "azimuth_rad": scan.scan.azimuth_rad,
@@ -267,7 +267,7 @@ fn scan_json(number: usize, scan: &RetrievedScan) -> Value {
         "chi2_per_dof": r.chi2_per_dof, "cells_used": r.cells_used, "cells_rejected": r.cells_rejected,
         "statistic": r.statistic, "threshold": r.threshold, "flags": r.flags,
         "parameters": parameters, "wake": r.wake.as_ref().map(wake_json), "covariance": covariance,
-        "secondary": secondary, "tops": tops,
+        "secondary": secondary, "minima": minima,
     });
     if let Some(turbulence) = &r.turbulence {
         object["turbulence"] = turbulence_json(turbulence);

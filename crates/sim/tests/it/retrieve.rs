@@ -87,7 +87,7 @@ fn reference_maps_are_retrieved_from_tables() {
     assert_eq!(
         (
             scan["covariance"].as_array().unwrap().len(),
-            scan["tops"].as_array().unwrap().is_empty()
+            scan["minima"].as_array().unwrap().is_empty()
         ),
         (10, false)
     );

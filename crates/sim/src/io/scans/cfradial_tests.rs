@@ -2,7 +2,7 @@ use super::*;
 use crate::io::netcdf::{self, Data};
 use crate::io::netcdf_input::open;
 use crate::io::provenance::example;
-use crate::io::variable::AWAY;
+use crate::io::variable::{AWAY, TOWARDS};
 use std::collections::BTreeMap;
 
 /// Variables with their lengths, text attributes and values.
