@@ -1,6 +1,6 @@
-//! Plugs an estimator of one's own into the accumulation: the noisy one that a textbook would try first.
+//! Plugs your own estimator into the accumulation: the noisy one that a textbook would try first.
 //!
-//! `cargo run --example own_estimator -p wakescope-estimate` maps a made-up scan with it and with the periodogram, and prints both.
+//! `cargo run --example own_estimator -p wakescope-estimate` maps a synthetic scan with it and with the periodogram, and prints both.
 //! Two traits are all that is needed: a [`Statistic`] that turns a window into numbers whose mean makes sense, and an
 //! [`Estimator`] that turns the mean into a velocity.
 

@@ -1,4 +1,4 @@
-//! Estimates velocities from windows of one's own: no other crate of wakescope is needed.
+//! Estimates velocities from your own windows: no other crate of wakescope is needed.
 //!
 //! `cargo run --example own_windows -p wakescope-estimate [FILE]` reads one record from a text file, one sample per line (real: one
 //! number; complex: two), and prints range, velocity, power and flag per gate. Without a file it makes a record itself.

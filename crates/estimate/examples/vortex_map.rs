@@ -1,4 +1,4 @@
-//! Finds the vortices in a map of radial velocities of one's own: no other crate of wakescope is needed.
+//! Finds the vortices in your own map of radial velocities: no other crate of wakescope is needed.
 //!
 //! `cargo run --release --example vortex_map -p wakescope-estimate [FILE]` reads `elevation_rad,range_m,velocity_m_s`
 //! per line (a full grid, lines by increasing elevation, ranges running fastest; NaN where there is none) and prints

@@ -34,7 +34,7 @@
 //! | [`spectrum`] | biased correlogram, also slid along a record; its power density on a whole grid |
 //! | [`models`] | autoregressive models (31), their spectrum (32) |
 //! | [`estimators`] | periodogram (29), (30), pulse pair, autoregressive peak, first moment, likelihood with tapers; their traits; when a peak is noise |
-//! | [`map`] | regions, accumulation (Table 3) and n_eff, the radius that a variance needs; errors against the truth, (33); good estimates told from bad ones |
+//! | [`map`] | regions, accumulation (Table 3) and n_eff, the radius that a variance needs; errors against the truth, (33); good and bad estimates |
 //! | [`bound`] | Cramer-Rao bound on the velocity |
 //! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
 //! | [`wake_detection`] | whether a scan holds a wake: threshold for a rate of false alarms, smallest circulation that is found |

@@ -291,7 +291,7 @@ struct Form<'a> {
     /// Stride of the samples that represent all.
     every: usize,
     /// Length of the window over that of the shorter window with similar tapers that represents it where only short lags count; the
-    /// density of the shorter window has so many times the variance.
+    /// density of the shorter window has a variance larger by this factor.
     shorter: usize,
     sampling: &'a Sampling,
     noise: Noise,

@@ -1,4 +1,4 @@
-//! From an accumulated correlogram to a velocity with width, SNR and flags; the traits for estimators of one's own.
+//! From an accumulated correlogram to a velocity with width, SNR and flags; the traits for your own estimators.
 
 pub(crate) mod cell_threshold;
 pub(crate) mod detection;

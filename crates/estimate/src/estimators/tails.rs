@@ -22,7 +22,7 @@ pub(crate) fn gamma_tail(a: f64, x: f64) -> f64 {
     }
 }
 
-/// Ends of the interval about the place up to which `is_below` holds, after so many bisections.
+/// Ends of the interval about the place up to which `is_below` holds, after this number of bisections.
 pub(crate) fn bisected(
     mut low: f64,
     mut high: f64,

@@ -1,4 +1,4 @@
-//! Good and bad estimates told apart: Gaussian errors in a flat floor over the band (Frehlich and Yadlowsky 1994).
+//! Good and bad estimates: Gaussian errors above a uniform floor over the band (Frehlich and Yadlowsky 1994).
 //!
 //! Fitted by expectation maximisation: the density of an error e is s N(e; b, sigma) + (1 - s)/B over a band of width B.
 //! Check: the parameters of drawn mixtures come back within their standard errors.

@@ -2,7 +2,7 @@
 //! the other profile of the cores where none is stated. Long gates may show one vortex where there is a pair: then a flag says so.
 //!
 //! Each alternative is a fit of its own, weighed by its likelihood. Long gates show circulation times spacing, so that the least chi-square
-//! lies anywhere along a ridge and its curvature says nothing of the ridge's length; there the wake that is told has the mean spacing of all.
+//! lies anywhere along a ridge and its curvature says nothing of the ridge's length; there the reported wake has the mean spacing of all.
 //! Check: deviations against the scatter over scans with gates longer than half the spacing, and over Lamb-Oseen wakes.
 
 use ndarray::Array2;

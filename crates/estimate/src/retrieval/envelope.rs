@@ -8,9 +8,9 @@
 //! kappa = 4 pi sigma_p / lambda,  sigma_p = sigma sigma_h / sqrt(sigma^2 + sigma_h^2);  calm air: V_T = sqrt(ln(S / (T - 1))) / kappa
 //! ```
 //!
-//! So three numbers are told: the raw one, that less the width in calm air, and the inverted one, for which each line's circulation is
+//! So three numbers are reported: the raw one, that less the width in calm air, and the inverted one, for which each line's circulation is
 //! the one that makes the expected V_T the measured one. The first two are tens of per cent wrong. Check: the errors of an
-//! independent program; made-up spectra.
+//! independent program; synthetic spectra.
 
 use ndarray::ArrayView3;
 use std::f64::consts::PI;
@@ -25,7 +25,7 @@ use crate::window::SPEED_OF_LIGHT_M_S;
 
 /// Distances from the core of the lines that are used \[m\].
 const OFF_M: (f64, f64) = (5.0, 15.0);
-/// Air that is integrated over: so many standard deviations of the gate to each side, in so many steps.
+/// Air that is integrated over: standard deviations of the gate to each side, and the number of steps.
 const REACH: f64 = 3.5;
 const STEPS: i32 = 140;
 /// Circulations that are tried \[m^2/s\] apart, how many, and halvings between two.

@@ -9,10 +9,10 @@ use crate::retrieval::{Gate, Movement, RetrievalOptions, ScanMap};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::{RangeKernel, Wake};
 
-/// A Gaussian weight is cut off after so many standard deviations, and sampled at so many points at last.
+/// Standard deviations after which a Gaussian weight is cut off, and the points at which the final fit samples it.
 const REACH: f64 = 3.5;
 const POINTS: usize = 41;
-/// A search is content with points so many times as far apart.
+/// Points of a search are farther apart by this factor.
 const COARSER: usize = 2;
 
 impl<'a> Gates<'a> {

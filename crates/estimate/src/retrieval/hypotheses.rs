@@ -376,7 +376,7 @@ impl<'a> Stage<'a> {
             .collect()
     }
 
-    /// The ends with each gate's own points: the likely one, which is told, to the last; of the others the chi-square.
+    /// The minima with each gate's own points: the most likely one, which is reported, until it converges; of the others the chi-square.
     pub(crate) fn fine(&self, ends: &[End]) -> Vec<End> {
         let likely = least(ends, self.squares.cells.len()).map(|likely| likely.chi2);
         self.onwards(ends, |end| {

@@ -1,4 +1,4 @@
-//! What is told of the fits of a scan: which vortices there are, their deviations, and flags.
+//! What is reported of the fits of a scan: which vortices there are, their standard deviations, and flags.
 //!
 //! Check: the reference maps; wakes at the end of the sector, near the ground, with a kept core.
 

@@ -192,7 +192,7 @@ pub enum Flag {
     TakenForMeans,
     /// Medians over blocks were fitted: there are more than 16 000 velocities, or more than 1500 to be whitened.
     Thinned,
-    /// The fit came to no end: what is told is where it was.
+    /// The fit did not converge: its last iterate is reported.
     NotConverged,
     /// The test of the scan for a wake, at the rate of false alarms that is stated for it, does not find this one.
     NotDetected,

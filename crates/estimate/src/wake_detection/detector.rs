@@ -17,7 +17,7 @@ use crate::retrieval::{Gate, ScanMap};
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use crate::wake_detection::bank::{Bank, DetectorOptions, Template};
 
-/// One part in so many of the cells may be missing in a scan.
+/// The fraction of cells that may be missing in a scan is one over this.
 const MISSING: usize = 2;
 /// Of the variance of a product with a place: keeps the covariance of all of them regular, and changes nothing else.
 const REGULAR: f64 = 1e-9;
@@ -51,7 +51,7 @@ pub struct WakeStatistic {
     /// Standard deviation of its circulation \[m^2/s\], were its place known.
     pub circulation_std_m2_s: f64,
     /// Correlation of what is left with the next gate and with the next line, made white and away from that wake: near 0 if the
-    /// background is the one that the test was told.
+    /// background is the one that the test assumes.
     pub neighbour_correlation: (f64, f64),
     /// What both scatter by about 0 in such a background: the reciprocal root of the number of neighbours.
     pub correlation_error: (f64, f64),

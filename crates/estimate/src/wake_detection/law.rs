@@ -38,7 +38,7 @@ pub struct EmptyScanLaw {
 }
 
 impl WakeDetector {
-    /// The law of the statistic in scans of wind, noise and the turbulence of the options: so many `scans` are drawn, each from the
+    /// The law of the statistic in scans of wind, noise and the turbulence of the options: `scans` are drawn, each from the
     /// generator that `stream` gives for its number.
     ///
     /// # Errors

@@ -7,7 +7,7 @@
 //! | `spikes` | velocities that stand off their neighbours, to be left out before |
 //! | `power` | [`DetectionTrials`]: share of wakes that are found, the smallest circulation that is |
 //!
-//! The rate of false alarms holds for the background that the test is told, and for no other: the threshold for white noise raises
+//! The rate of false alarms holds for the background that the test assumes, and for no other: the threshold for white noise raises
 //! an alarm in nearly every empty scan of turbulent air.
 
 mod bank;

@@ -59,7 +59,7 @@ impl WakeDetector {
         None
     }
 
-    /// Trials with the given wakes, in turn, in so many drawn backgrounds.
+    /// Trials with the given wakes, in turn, in this number of drawn backgrounds.
     ///
     /// # Errors
     /// [`Error::Empty`] without wakes, [`Error::OutOfRange`] for one that is impossible or has no circulation.

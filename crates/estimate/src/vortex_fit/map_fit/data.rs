@@ -112,7 +112,7 @@ impl VelocityMap<'_> {
         }
     }
 
-    /// Places of the velocities that there are in a block of so many lines and gates.
+    /// Places of the known velocities in a block of lines and gates.
     fn known_in(
         &self,
         (line, gate): (usize, usize),
@@ -171,7 +171,7 @@ pub(crate) fn ends(axis: &[f64]) -> (f64, f64) {
     )
 }
 
-/// Means of an axis over blocks of so many.
+/// Means of an axis over blocks of this length.
 pub(crate) fn block_means(axis: &[f64], by: usize) -> Vec<f64> {
     axis.chunks(by)
         .map(|block| block.iter().sum::<f64>() / block.len() as f64)

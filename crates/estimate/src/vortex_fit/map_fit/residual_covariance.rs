@@ -19,7 +19,7 @@
 //! M C M, M = 1 - Q Q^T, Q an orthonormal basis of the slopes. c_1 is kept if the white correlogram is beyond chance. That is right for turbulence;
 //! own maps it serves worse than the first (measured over 60 scans: scatter over stated 1.14 instead of 1.05).
 //!
-//! Check: the spread of fits over many maps; made-up noise, white and with known correlations, and with more in some cells.
+//! Check: the spread of fits over many maps; synthetic noise, white and with known correlations, and with more in some cells.
 
 use ndarray::{Array2, ArrayView1};
 use num_complex::Complex;

@@ -1,7 +1,7 @@
 //! Where fits of maps begin, and which of their ends is taken.
 //!
 //! Core radii are tried small and large; what they end at is compared by the likelihood that the loss stands for. Ends that are
-//! not the best but compete with it add their distance to the covariance, weighted with their likelihood. Check: made-up ends; fits of many maps.
+//! not the best but compete with it add their distance to the covariance, weighted with their likelihood. Check: synthetic minima; fits of many maps.
 
 use crate::error::Error;
 use crate::vortex_fit::map_fit::prediction::LONE_M;
@@ -15,7 +15,7 @@ pub(crate) const CORE_OVER_SPACING: f64 = CorePrior::TYPICAL.median_ratio;
 const CORES_OVER_SPACING: [f64; 2] = [CORE_OVER_SPACING, 0.1];
 /// Circulation of a vortex over that of its partner, below which another one may be the partner.
 const WEAK: f64 = 0.5;
-/// A typical core is known to this part of itself, after at most so many rounds.
+/// Relative change of the typical core at which its iteration ends, and the largest number of rounds.
 const TYPICAL: f64 = 0.05;
 const ROUNDS: usize = 3;
 
@@ -99,7 +99,7 @@ pub(crate) fn chi2(end: &MapFit) -> f64 {
     end.tops.first().map_or(f64::INFINITY, |top| top.chi2)
 }
 
-/// Whether two ends are closer than so many errors of the first.
+/// Whether two minima are closer than this number of standard errors of the first.
 fn same(a: &MapFit, b: &MapFit, sigmas: f64) -> bool {
     let apart = b
         .wake

@@ -37,7 +37,7 @@ impl Motion {
         }
     }
 
-    /// The wake after so many seconds.
+    /// The wake after this number of seconds.
     pub(crate) fn wake_after(&self, wake: &Wake, seconds: f64) -> Wake {
         let mut p = wake.to_array();
         MOVING
@@ -46,7 +46,7 @@ impl Motion {
         Wake::from_array(&p)
     }
 
-    /// Turns derivatives by the parameters of the wake after so many seconds into those by the parameters of the wake at first.
+    /// Turns derivatives by the parameters of the wake at a later time into those by the parameters of the wake at the start.
     pub(crate) fn carry_back(&self, seconds: f64, slope: &mut [f64; PARAMETERS]) {
         let then = *slope;
         for (place, row) in MOVING.zip(&self.slopes) {

@@ -70,7 +70,7 @@ impl Plates {
         self.case([1.0, 0.0], 0.05, |_| 0.0)
     }
 
-    /// Walls of speeds `wall_m_s`, an initial `u(z)`, an end after so many viscous times.
+    /// Walls of speeds `wall_m_s`, an initial `u(z)`, an end after a number of viscous times.
     fn case(
         self,
         wall_m_s: [f64; 2],
