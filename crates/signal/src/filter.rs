@@ -19,6 +19,9 @@ const STEPS_PER_LAYER: f64 = (1_u64 << 24) as f64;
 /// Halvings of an interval, which exhaust double precision.
 const HALVINGS: usize = 60;
 
+/// Ranges whose sums are formed side by side, so that none waits for the addition before.
+const TOGETHER: usize = 4;
+
 /// Smallest fraction of the weight on air with a known velocity.
 const LEAST_KNOWN_WEIGHT: f64 = 0.5;
 
@@ -39,6 +42,58 @@ struct LayerWeights {
     /// Index of the first layer from the central one.
     first: i64,
     weights: Vec<f64>,
+}
+
+impl LayerWeights {
+    /// Writes the means about some layers of a profile; `is_known`: no velocity is NaN.
+    fn apply_into(
+        &self,
+        layers: &[i64],
+        radial_velocity_m_s: &[f64],
+        is_known: bool,
+        out_m_s: &mut [f64],
+    ) {
+        let known: f64 = self.weights.iter().sum();
+        for (layers, out_m_s) in layers.chunks(TOGETHER).zip(out_m_s.chunks_mut(TOGETHER)) {
+            let mut parts = Vec::with_capacity(TOGETHER);
+            if is_known {
+                parts.extend(
+                    layers
+                        .iter()
+                        .filter_map(|layer| self.covered(*layer, radial_velocity_m_s)),
+                );
+            }
+            if let &[a, b, c, d] = parts.as_slice() {
+                for (out, sum) in out_m_s.iter_mut().zip(self.sums([a, b, c, d])) {
+                    *out = sum / known;
+                }
+                continue;
+            }
+            for (layer, out) in layers.iter().zip(out_m_s) {
+                let first = layer.saturating_add(self.first);
+                *out = mean_of_profile(&self.weights, first, radial_velocity_m_s);
+            }
+        }
+    }
+
+    /// The layers of a profile that the weights about one of them lie on, if it has them all.
+    fn covered<'v>(&self, layer: i64, radial_velocity_m_s: &'v [f64]) -> Option<&'v [f64]> {
+        let first = usize::try_from(layer.checked_add(self.first)?).ok()?;
+        radial_velocity_m_s.get(first..first.checked_add(self.weights.len())?)
+    }
+
+    /// Sums of several parts of a profile, side by side, each in the order of its layers.
+    fn sums(&self, [a, b, c, d]: [&[f64]; TOGETHER]) -> [f64; TOGETHER] {
+        let mut sums = [0.0; TOGETHER];
+        let parts = a.iter().zip(b).zip(c.iter().zip(d));
+        for (weight, ((a, b), (c, d))) in self.weights.iter().zip(parts) {
+            sums[0] += weight * a;
+            sums[1] += weight * b;
+            sums[2] += weight * c;
+            sums[3] += weight * d;
+        }
+        sums
+    }
 }
 
 impl RangeFilter {
@@ -228,9 +283,10 @@ impl RangeFilter {
         check("first_range_m", first_range_m, "finite", |_| true)?;
         check_length("out_m_s", out_m_s.len(), range_m.len())?;
         check_any("radial_velocity_m_s", radial_velocity_m_s.len())?;
-        let mut fraction = 0.0;
-        let mut shifted = self.centred.clone();
-        for (index, (&range_m, out)) in range_m.iter().zip(out_m_s).enumerate() {
+        let is_known = !radial_velocity_m_s.iter().any(|v| v.is_nan());
+        let mut nearest_layers = Vec::with_capacity(range_m.len());
+        let mut fractions = Vec::with_capacity(range_m.len());
+        for (index, &range_m) in range_m.iter().enumerate() {
             if !range_m.is_finite() {
                 return Err(Error::ElementOutOfRange {
                     field: "range_m",
@@ -241,13 +297,21 @@ impl RangeFilter {
             }
             let position = (range_m - first_range_m) / self.layer_thickness_m;
             let nearest = position.round();
-            let next_fraction = ((position - nearest) * STEPS_PER_LAYER).round() / STEPS_PER_LAYER;
-            if next_fraction != fraction {
-                fraction = next_fraction;
-                shifted = self.layer_weights(fraction);
+            nearest_layers.push(nearest as i64);
+            fractions.push(((position - nearest) * STEPS_PER_LAYER).round() / STEPS_PER_LAYER);
+        }
+        let mut start = 0;
+        for alike in fractions.chunk_by(|a, b| a == b) {
+            let shifted;
+            let mut weights = &self.centred;
+            if alike[0] != 0.0 {
+                shifted = self.layer_weights(alike[0]);
+                weights = &shifted;
             }
-            let first = (nearest as i64).saturating_add(shifted.first);
-            *out = mean_of_profile(&shifted.weights, first, radial_velocity_m_s);
+            let here = start..start + alike.len();
+            let layers = &nearest_layers[here.clone()];
+            weights.apply_into(layers, radial_velocity_m_s, is_known, &mut out_m_s[here]);
+            start += alike.len();
         }
         Ok(())
     }

@@ -338,7 +338,10 @@ impl ScanGeometry {
     pub fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
         let slack_m = 1e-6 * self.spacing_m;
         let radius_m = radius_m + slack_m;
-        self.lines_near(point, radius_m).filter_map(move |line| {
+        let least_cos = least_cos_within(radius_m / point.range_m);
+        let near = self.lines_near(point, radius_m);
+        let near = near.filter(move |line| self.may_touch(point.line, *line, least_cos));
+        near.filter_map(move |line| {
             let (sin, cos) = self.sin_cos_to(point.line, line);
             let across_m = point.range_m * sin;
             let along_m = point.range_m * cos;
@@ -377,6 +380,19 @@ impl ScanGeometry {
         let start = lines.partition_point(|line| *line < elevation_rad - reach_rad);
         let end = lines.partition_point(|line| *line <= elevation_rad + reach_rad);
         start..end.max(start)
+    }
+
+    /// Whether the cosine of the angle to a line that is in no plane lets it touch a disc. Most lines of a sweep do not, and chords
+    /// need sines.
+    fn may_touch(&self, line: LineOfSight, other: usize, least_cos: f64) -> bool {
+        let LineOfSight::Index(line) = line else {
+            return true;
+        };
+        let Some(([a, b, c], _)) = self.sphere.get(line) else {
+            return true;
+        };
+        let [d, e, f] = self.sphere[other].0;
+        a * d + b * e + c * f >= least_cos
     }
 
     /// Elevation of a line of sight of a plane scan \[rad\].
@@ -441,6 +457,16 @@ impl ScanGeometry {
     #[must_use]
     pub fn most_gates(&self, radius_m: f64) -> usize {
         ((2.0 * radius_m / self.spacing_m + 1e-5) as usize).min(self.gates - 1) + 1
+    }
+}
+
+/// Least cosine of the angle between lines one of which touches a disc about the other, by the ratio of radius to range; less by more
+/// than rounding, so that none is lost.
+fn least_cos_within(ratio: f64) -> f64 {
+    if ratio < 1.0 {
+        (1.0 - ratio * ratio).sqrt() - 1e-12
+    } else {
+        f64::NEG_INFINITY
     }
 }
 

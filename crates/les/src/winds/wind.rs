@@ -115,8 +115,16 @@ pub(super) fn combine(
     out_m_s: &mut [[f64; 3]],
     act: impl Fn(&mut f64, f64),
 ) -> Result<(), Error> {
-    let mut others = vec![[0.0; 3]; points_m.len()];
-    wind.velocity_into(points_m, time_s, &mut others)?;
+    // The path of a pair evaluates winds at one point some 100 000 times.
+    let mut of_one = [[0.0; 3]];
+    let mut of_many = Vec::new();
+    let others: &mut [[f64; 3]] = if points_m.len() == 1 {
+        &mut of_one
+    } else {
+        of_many.resize(points_m.len(), [0.0; 3]);
+        &mut of_many
+    };
+    wind.velocity_into(points_m, time_s, others)?;
     out_m_s
         .as_flattened_mut()
         .iter_mut()

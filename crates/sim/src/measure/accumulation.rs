@@ -63,7 +63,7 @@ pub(crate) fn lags_per_window(plan: &Plan) -> usize {
 /// Time of one record, s of one core.
 pub(crate) fn record_s(plan: &Plan) -> f64 {
     let n = &plan.counts;
-    n.layers * 5.4e-8 + n.samples * (n.layers_per_sample * 1.2e-10 + 5e-8)
+    n.signal_layers * 5.4e-8 + n.samples * (n.layers_per_sample * 1.2e-10 + 5e-8)
 }
 
 /// Time to factor the covariance of the records of a line, s of one core.
@@ -71,7 +71,7 @@ pub(crate) fn factor_s(plan: &Plan) -> f64 {
     let n = &plan.counts;
     let g = &plan.geometry;
     // Samples that one layer contributes to, and the mean share of its layers that two of them have.
-    let lit = n.layers_per_sample * g.layer_thickness_m / g.sample_spacing_m;
+    let lit = n.layers_per_sample * g.signal_layer_thickness_m / g.sample_spacing_m;
     let near = n.samples.min(lit);
     let pairs = near * (1.0 - 0.5 * near / lit);
     let covariance_s = n.samples * n.layers_per_sample * (2.5e-8 + pairs * 3e-10);

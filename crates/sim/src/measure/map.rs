@@ -227,14 +227,8 @@ fn truth(plan: &Plan, air: &ScanAir, shape: (usize, usize)) -> Result<VelocityEs
     let by_pulse = RangeFilter::pulse(&plan.instrument.pulse, g.layer_thickness_m)?;
     let by_gate = range_filter(plan)?;
     for i in 0..air.lines.len() {
-        exact_m_s
-            .row_mut(i)
-            .assign(&Array1::from(radial_velocity_m_s(
-                plan,
-                &air.wind,
-                i,
-                &g.gate_range_m,
-            )?));
+        let at_gates_m_s = exact_at_gates_m_s(plan, air, i)?;
+        exact_m_s.row_mut(i).assign(&Array1::from(at_gates_m_s));
         let line = &air.lines[i];
         for (filter, cells) in [(&by_pulse, &mut pulse_m_s), (&by_gate, &mut gate_m_s)] {
             cells.row_mut(i).assign(&Array1::from(weighted_at_gates_m_s(
@@ -252,6 +246,27 @@ fn truth(plan: &Plan, air: &ScanAir, shape: (usize, usize)) -> Result<VelocityEs
         v_scan_m_s: Array2::from_elem(shape, f64::NAN),
         ..VelocityEstimates::default()
     })
+}
+
+/// Radial velocity of the air at the gates of a line, m/s. Where the signals of lines have layers of their own, it is that of the layer
+/// at each gate: eddies are summed along a line once.
+fn exact_at_gates_m_s(plan: &Plan, air: &ScanAir, line: usize) -> Result<Vec<f64>, Error> {
+    let g = &plan.geometry;
+    let along = &air.lines[line];
+    let mut at_gates_m_s = Vec::with_capacity(g.gate_range_m.len());
+    for range_m in &g.gate_range_m {
+        let layer = (range_m - along.first_range_m) / along.layer_thickness_m;
+        let nearest = layer.round();
+        let velocity_m_s = along.radial_velocity_m_s.get(nearest as usize);
+        if let (true, Some(velocity_m_s)) = ((layer - nearest).abs() < 1e-6, velocity_m_s) {
+            at_gates_m_s.push(*velocity_m_s);
+        }
+    }
+    let is_on_layers = at_gates_m_s.len() == g.gate_range_m.len();
+    if plan.scene().has_layers_of_each_line() && is_on_layers {
+        return Ok(at_gates_m_s);
+    }
+    radial_velocity_m_s(plan, &air.wind, line, &g.gate_range_m)
 }
 
 /// Runs the estimates of all realisations, of several plans that differ in their estimators alone: the signals of each are made

@@ -97,11 +97,7 @@ impl ScanAir {
         let spread_m_s =
             spreads.and_then(|values| Array2::from_shape_vec(shape, values.concat()).ok());
         let previous = previous_air(plan, &wind, &lines)?;
-        let is_alone = spread_m_s.is_none() && previous.is_none();
-        let thick = match is_alone && drawn_turbulence(plan.scene()).is_none() {
-            true => layers::thick_lines(plan, &lines)?,
-            false => Vec::new(),
-        };
+        let thick = layers::thick_lines(plan, &lines)?;
         Ok(Self {
             thick,
             wind,

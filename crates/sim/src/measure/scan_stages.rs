@@ -53,7 +53,7 @@ pub(crate) fn signals(plan: &Plan) -> PlannedStage {
             let why = why.map_or(String::new(), |why| format!("; not drawn at once: {why}"));
             format!(
                 "{} x {} records of {} samples, {} layers each{why}",
-                n.realisations, n.records, g.samples, g.layers_per_sample
+                n.realisations, n.records, g.samples, n.layers_per_sample
             )
         }
     };

@@ -19,7 +19,9 @@ pub(crate) struct Counts {
     pub(crate) parts: f64,
     /// Scattering layers of a line.
     pub(crate) layers: f64,
-    /// Layers that contribute to one sample.
+    /// Those of most signals, which may be thicker.
+    pub(crate) signal_layers: f64,
+    /// Layers of most signals that contribute to one sample.
     pub(crate) layers_per_sample: f64,
     /// Realisations.
     pub(crate) realisations: f64,
@@ -35,6 +37,7 @@ impl Counts {
     /// Those of a scene with its geometry.
     pub(crate) fn new(scene: &Scene, target: Target, g: &Geometry) -> Self {
         let lines = g.elevation_rad.len() as f64;
+        let thicker = g.signal_layer_thickness_m / g.layer_thickness_m;
         let kept = kept_realisations(scene, target) as f64;
         Self {
             lines,
@@ -45,7 +48,8 @@ impl Counts {
                 DetectorSignal::Baseband => 2.0,
             },
             layers: g.layers as f64,
-            layers_per_sample: g.layers_per_sample as f64,
+            signal_layers: (g.layers as f64 / thicker).ceil(),
+            layers_per_sample: (g.layers_per_sample as f64 / thicker).ceil(),
             realisations: if target.has_map() {
                 scene.scan.realisations as f64
             } else {

@@ -6,7 +6,7 @@ use crate::plan::Plan;
 use crate::plan::line_wind::known_velocity_m_s;
 
 /// Most lines, and most points along all of them, at which the fastest air is looked for first.
-const MOST_LINES: usize = 1000;
+const MOST_LINES: usize = 300;
 const MOST_POINTS: usize = 100_000;
 
 /// Largest radial velocity of the air on the lines of sight, relative to the lidar, m/s.
@@ -29,7 +29,8 @@ pub(super) fn fastest_m_s(plan: &Plan) -> Result<f64, Error> {
         found.push((fastest_m_s, at_m, line));
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    // The peak of a vortex lies between the points: about those of the fastest lines again.
+    // The peak of a vortex lies between the points and the lines: about those of the fastest lines again.
+    let stride = all_lines.div_ceil(lines);
     let step_m = range_m[1] - range_m[0];
     let mut fastest_m_s = found.first().map_or(0.0, |fastest| fastest.0);
     for (_, at_m, line) in found.into_iter().take(8) {
@@ -38,8 +39,11 @@ pub(super) fn fastest_m_s(plan: &Plan) -> Result<f64, Error> {
             (at_m + step_m).min(scan.range_max_m),
             65,
         );
-        let (near_m_s, _) = fastest_of_line(plan, line, &near_m)?;
-        fastest_m_s = fastest_m_s.max(near_m_s);
+        let end = (line + stride).min(all_lines);
+        for beside in (line + 1).saturating_sub(stride)..end {
+            let (near_m_s, _) = fastest_of_line(plan, beside, &near_m)?;
+            fastest_m_s = fastest_m_s.max(near_m_s);
+        }
     }
     let [x_m_s, y_m_s, z_m_s] = scan.lidar.velocity_m_s;
     let lidar_m_s = (x_m_s * x_m_s + y_m_s * y_m_s + z_m_s * z_m_s).sqrt();

@@ -2,7 +2,7 @@
 //!
 //! Check: each limit is broken once, in `tests/it/air.rs`.
 
-use super::{Flow, Scene};
+use super::{EfficiencyOfPulse, Flow, Scene, VortexPair, WindOfPulses};
 use crate::keys::{Checker, Problem, keys};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use wakescope_estimate::turbulence::VonKarman;
@@ -344,6 +344,21 @@ impl Scene {
     pub(crate) fn has_air_of_each_realisation(&self) -> bool {
         self.eddies()
             .is_some_and(|eddies| eddies.realisations == EddyRealisations::Each)
+    }
+
+    /// Whether its flow is a pair that is transported.
+    pub(crate) fn has_transported_pair(&self) -> bool {
+        self.flow.pair().is_some_and(VortexPair::is_transported)
+    }
+
+    /// Whether the signals of each line have layers as thick as the wind of that line allows. Pulses with winds, echoes or efficiencies
+    /// of their own have those of the scan.
+    pub(crate) fn has_layers_of_each_line(&self) -> bool {
+        let turbulence = self.refractive_turbulence();
+        self.has_transported_pair()
+            && self.scan.wind_of_pulses == WindOfPulses::default()
+            && self.scan.second_trip.is_none()
+            && turbulence.is_none_or(|t| t.efficiency != EfficiencyOfPulse::Realisation)
     }
 
     /// The rules between flows.

@@ -8,9 +8,8 @@
 
 use crate::Error;
 use crate::plan::Plan;
-use crate::plan::geometry::Geometry;
-use crate::scene::VortexPair;
-use wakescope_signal::{LayerLimits, LineOfSight};
+use crate::plan::geometry::{Geometry, layer_limits};
+use wakescope_signal::LineOfSight;
 
 /// The line of sight that the signals of each line have; `None` where it is that of the scan.
 ///
@@ -20,8 +19,7 @@ pub(super) fn thick_lines(
     plan: &Plan,
     lines: &[LineOfSight],
 ) -> Result<Vec<Option<LineOfSight>>, Error> {
-    let pair = plan.scene().flow.pair();
-    if !pair.is_some_and(VortexPair::is_transported) {
+    if !plan.scene().has_layers_of_each_line() {
         return Ok(Vec::new());
     }
     lines.iter().map(|line| thick_line(plan, line)).collect()
@@ -30,16 +28,12 @@ pub(super) fn thick_lines(
 /// A line with the thickest layers that its steepest wind allows; `None` if they are as thin as those of the scan.
 fn thick_line(plan: &Plan, line: &LineOfSight) -> Result<Option<LineOfSight>, Error> {
     let g = &plan.geometry;
-    let scene = plan.scene();
     let steepest_per_s = steepest_per_s(line);
     if steepest_per_s.is_nan() {
         return Ok(None);
     }
-    let allowed_m = plan.instrument.pulse.layer_thickness_m(LayerLimits {
-        sample_rate_hz: scene.detector.sampling_hz,
-        wavelength_m: scene.laser.wavelength_m,
-        max_gradient_per_s: steepest_per_s,
-    })?;
+    let limits = layer_limits(plan.scene(), steepest_per_s);
+    let allowed_m = plan.instrument.pulse.layer_thickness_m(limits)?;
     let parts = (g.sample_spacing_m / g.layer_thickness_m).round() as usize;
     let least = (g.sample_spacing_m / allowed_m).round() as usize;
     let divides = |fewer: &usize| parts.is_multiple_of(*fewer);
@@ -92,14 +86,16 @@ mod tests {
     use crate::measure::map;
     use crate::measure::scan::Scanner;
     use crate::plan::Target;
+    use crate::plan::line_wind::radial_velocity_m_s;
     use crate::progress::Silent;
     use crate::scene::SceneFile;
     use std::path::Path;
+    use wakescope_signal::{Record, Simulator};
 
     /// A plan of a pair with this motion.
     fn plan(motion: &str) -> Plan {
         let text = format!(
-            "[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n[flow]\nmotion = \"{motion}\"\n[scan]\nelevation_min_rad = 0.02\n\
+            "[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n[flow]\nmotion = \"{motion}\"\ncore_radius_m = 0.8\n[scan]\nelevation_min_rad = 0.02\n\
              elevation_step_rad = 0.02\npulses_per_line = 2\nrealisations = 64\n[estimator]\nwindow_step_samples = 4\n"
         );
         let file = SceneFile::parse(&text, Path::new("s.toml")).unwrap();
@@ -135,6 +131,72 @@ mod tests {
                 .unwrap()
                 .is_empty()
         );
+    }
+
+    /// Range of the steepest wind of a line, m.
+    fn steepest_at_m(line: &LineOfSight) -> f64 {
+        let mut found = (0.0, 0);
+        for (layer, pair) in line.radial_velocity_m_s.windows(2).enumerate() {
+            let change_m_s = (pair[1] - pair[0]).abs();
+            if change_m_s > found.0 {
+                found = (change_m_s, layer);
+            }
+        }
+        line.range_m(found.1)
+    }
+
+    /// The same air in layers an eighth as thick.
+    fn refined(plan: &Plan, line: usize, coarse: &LineOfSight) -> LineOfSight {
+        let layer_thickness_m = coarse.layer_thickness_m / 8.0;
+        let layers = 8 * coarse.layers();
+        let mut range_m = Vec::with_capacity(layers);
+        for layer in 0..layers {
+            range_m.push(coarse.first_range_m + layer as f64 * layer_thickness_m);
+        }
+        LineOfSight {
+            layer_thickness_m,
+            radial_velocity_m_s: radial_velocity_m_s(plan, &plan.wind, line, &range_m).unwrap(),
+            weight_per_m: vec![coarse.weight_per_m[0]; layers],
+            ..*coarse
+        }
+    }
+
+    #[test]
+    fn covariances_of_records_are_those_of_layers_an_eighth_as_thick() {
+        // The smallest core of the preset `landing`, which lines pass at all distances.
+        let text = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n[flow]\nmotion = \"transported\"\nspacing_m = 26.6\n\
+                    core_radius_m = 1.33\ncirculation_m2_s = 250.0\n[scan]\nelevation_step_rad = 1.6e-3\n";
+        let file = SceneFile::parse(text, Path::new("s.toml")).unwrap();
+        let plan = Plan::new(file, Target::Map).unwrap();
+        let scanner = Scanner::new(&plan, &Silent).unwrap();
+        let samples = plan.scene().estimator.window_samples;
+        let mut worst: f64 = 0.0;
+        let mut steep = 0;
+        for (index, line) in scanner.air.lines.iter().enumerate() {
+            if steepest_per_s(line) < 1.0 {
+                continue;
+            }
+            steep += 1;
+            let of_signals = scanner.air.of_signals(index);
+            let middle_m = 0.5 * samples as f64 * plan.geometry.sample_spacing_m;
+            let record = Record {
+                time_of_first_sample_s: 2.0 * (steepest_at_m(line) - middle_m)
+                    / crate::SPEED_OF_LIGHT_M_S,
+                samples,
+            };
+            let simulator =
+                Simulator::new(&plan.instrument.pulse, plan.instrument.receiver, record).unwrap();
+            let thick_a2 = simulator.covariance_a2(of_signals).unwrap();
+            let thin_a2 = simulator
+                .covariance_a2(&refined(&plan, index, of_signals))
+                .unwrap();
+            let power_a2 = thin_a2[(samples / 2, samples / 2)].re;
+            for (thick_a2, thin_a2) in thick_a2.iter().zip(&thin_a2) {
+                worst = worst.max((thick_a2 - thin_a2).norm() / power_a2);
+            }
+        }
+        assert!(steep > 5, "{steep}");
+        assert!(worst < 0.02, "{worst}");
     }
 
     #[test]

@@ -130,7 +130,7 @@ impl Scanner<'_> {
     ) -> Result<AccumulatedProducts<T>, Error> {
         let shot = Shot {
             previous: air.previous.as_ref().map(|lines| &lines[line]),
-            ..Shot::from(&air.lines[line])
+            ..Shot::from(air.of_signals(line))
         };
         AccumulatedProducts::new(&self.simulator, shot).map_err(|source| Error::OfLine {
             line,
