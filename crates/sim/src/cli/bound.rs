@@ -33,18 +33,33 @@ pub(super) fn bound(
         None => cli.refuse_idle(plan.file.path(), WITHOUT_OUTPUT)?,
     }
     let found = of_plan(plan, &Silent)?;
-    let mut text = found.text();
+    let mut text = found.text() + &air_note(plan);
     if let Some(file) = out {
         cli.write_file(file, found.table().to_csv(&plan.file.provenance())?)?;
         text += &format!("wrote {}\n", file.display());
     }
     let file = out.map(|file| file.display().to_string());
-    let object = json!({
+    let mut object = json!({
         "version": crate::VERSION, "scene_hash": plan.file.hash, "by_snr": points(&found.by_snr).objects(),
         "by_range": points(&found.by_range).objects(),
         "files": file,
     });
+    state_air(plan, &mut object);
     cli.say(&object, &text)
+}
+
+/// Which air the numbers are for, where it changes with height.
+fn air_note(plan: &Plan) -> String {
+    plan.air_elevation_rad().map_or(String::new(), |elevation_rad| {
+        format!("air of the line in the middle of the scan, at an elevation of {elevation_rad:.4} rad\n")
+    })
+}
+
+/// The same in a JSON object.
+fn state_air(plan: &Plan, object: &mut serde_json::Value) {
+    if let Some(elevation_rad) = plan.air_elevation_rad() {
+        object["air_elevation_rad"] = json!(elevation_rad);
+    }
 }
 
 /// Prints the budget of a scene at some ranges, m, or those of its scan, and writes its table to a
@@ -68,7 +83,7 @@ pub(super) fn budget(
         range_m.to_vec()
     };
     let found = Budget::new(&plan, &ranges_m, &*cli.observer())?;
-    let mut text = found.text();
+    let mut text = found.text() + &air_note(&plan);
     let mut files = Vec::new();
     if let Some(folder) = out {
         let of = (scene::Outputs::default(), plan.file.provenance());
@@ -77,9 +92,10 @@ pub(super) fn budget(
         })?;
         text += &format!("wrote {}\n", folder.join("budget.csv").display());
     }
-    let object = json!({
+    let mut object = json!({
         "version": crate::VERSION, "scene_hash": plan.file.hash, "range_m": found.range_m, "rows": found.rows,
         "limits": found.limits.values.iter().copied().collect::<BTreeMap<_, _>>(), "warnings": found.warnings, "files": paths(&files),
     });
+    state_air(&plan, &mut object);
     cli.say(&object, &text)
 }

@@ -171,6 +171,12 @@ impl Plan {
     pub(crate) fn reference_line(&self) -> usize {
         self.layered_air.slant_of_line.len() / 2
     }
+
+    /// Elevation of that line, rad; none where the air does not change with height.
+    pub(crate) fn air_elevation_rad(&self) -> Option<f64> {
+        let is_layered = self.scene().has_layered_air();
+        is_layered.then(|| self.geometry.elevation_rad[self.reference_line()])
+    }
 }
 
 #[cfg(test)]

@@ -139,12 +139,17 @@ impl SceneWind {
         let wind: Arc<dyn Wind> = Arc::new(les::winds::Sum {
             winds: vec![Box::new(self.steady), later],
         });
+        let source = if self.source == other.source {
+            self.source
+        } else {
+            format!("{}; added: {}", self.source, other.source)
+        };
         Self {
             steady: wind.clone(),
             wind,
             end_s: self.end_s.min(other.end_s - by_s),
             max_speed_m_s: self.max_speed_m_s + other.max_speed_m_s,
-            source: format!("{}; added: {}", self.source, other.source),
+            source,
             field_times_s,
             ..self
         }

@@ -5,7 +5,7 @@
 
 use super::{Estimator, FrontEnd, HeadMotion, NoiseModel, Pattern, RefractiveTurbulence};
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
-use super::{RegionRadius, SignalsOf};
+use super::{RegionRadius, SignalsOf, VortexPair};
 use crate::keys::{Text, lines_with_keys, to_table, value_at};
 use toml::Value;
 
@@ -160,12 +160,38 @@ impl Scene {
     }
 }
 
+/// Keys of transported pairs that a text states with their default for another motion; `check` refuses other values.
+fn idle_transport(scene: &Scene, document: &Text<'_>) -> Vec<Problem> {
+    let usual = VortexPair::default();
+    let mut found = Vec::new();
+    for (at, flow) in scene.flows() {
+        let Some(pair) = flow.pair().filter(|pair| !pair.is_transported()) else {
+            continue;
+        };
+        let keys = [
+            ("decay", pair.decay == usual.decay, "\"two_phase\""),
+            ("buoyancy_per_s", pair.buoyancy_per_s == 0.0, "0.0"),
+            ("rebound", !pair.rebound, "false"),
+            ("meander", !pair.meander, "false"),
+        ];
+        for (name, is_default, value) in keys {
+            let key = format!("{at}.{name}");
+            if is_default && document.line(&key).is_some() {
+                let allowed = format!("absent without {at}.motion = \"transported\"");
+                found.push(Problem::new(&key, value, allowed));
+            }
+        }
+    }
+    found
+}
+
 /// What a text states in vain.
 pub(super) fn problems(scene: &Scene, document: &Text<'_>) -> Vec<Problem> {
     let mut idle = idle(scene);
     idle.retain(|(key, _)| document.line(key).is_some());
+    let mut found = idle_transport(scene, document);
     if idle.is_empty() {
-        return Vec::new();
+        return found;
     }
     let mut usual = Scene::default();
     usual.detector.front_end = Some(FrontEnd::default());
@@ -179,7 +205,8 @@ pub(super) fn problems(scene: &Scene, document: &Text<'_>) -> Vec<Problem> {
             .unwrap_or_default();
         Problem::new(key, value, format!("{purpose}: take the line out"))
     };
-    idle.into_iter().map(problem).collect()
+    found.extend(idle.into_iter().map(problem));
+    found
 }
 
 #[cfg(test)]
@@ -247,6 +274,29 @@ mod tests {
                 "{message}"
             );
         }
+    }
+
+    #[test]
+    fn keys_of_a_transported_pair_are_refused_beside_another_motion_even_with_their_default() {
+        for (text, key) in [
+            ("[flow.decay]\nlaw = \"two_phase\"\n", "decay"),
+            (
+                "[flow]\ndecay = { law = \"two_phase\" }\nmotion = \"inviscid\"\n",
+                "decay",
+            ),
+            ("[flow]\nbuoyancy_per_s = 0.0\n", "buoyancy_per_s"),
+            ("[flow]\nrebound = false\n", "rebound"),
+            ("[flow]\nmeander = false\n", "meander"),
+        ] {
+            let message = parse(text).unwrap_err();
+            let wanted = "is not allowed: absent without flow.motion = \"transported\"";
+            assert!(
+                message.contains(&format!("flow.{key} = ")) && message.contains(wanted),
+                "{message}"
+            );
+        }
+        let moving = "[flow]\nmotion = \"transported\"\nrebound = false\nmeander = false\ndecay = { law = \"two_phase\" }\n";
+        assert!(parse(moving).is_ok());
     }
 
     #[test]
