@@ -1,12 +1,16 @@
 //! The air: closed forms of the winds, and what pulse and window make of them, (V1) to (V10), (S11), (S12).
 
+use super::eddies::{self, Eddies};
 use super::geometry::{Scan, line_time_s};
 use super::ledger::Ledger;
 use super::power::Pulse;
-use super::program::Csv;
+use super::program::{Bench, Csv};
 use super::scene::Scene;
 use std::f64::consts::PI;
 use toml::Value;
+
+/// Error that the path of a transported pair may have, of the largest velocity.
+const OF_PATH: f64 = 1e-5;
 
 /// One wind of a scene, as its keys.
 struct Wind<'a>(&'a dyn Fn(&str) -> Option<Value>);
@@ -54,8 +58,8 @@ impl Wind<'_> {
     /// Velocity (u, v, w) at a point, `time_s` after the scan began.
     fn at(&self, p: [f64; 3], time_s: f64) -> [f64; 3] {
         match self.s("kind").as_str() {
-            "calm" => [0.0; 3],
-            // None of the draw has eddies; each of their keys is examined on its own.
+            // What is random in turbulence is held by its averages.
+            "calm" | "eddies" => [0.0; 3],
             "wind" => self.mean_wind(p[2]),
             "uniform" => [0.0, self.f("lateral_m_s"), self.f("vertical_m_s")],
             "linear" => {
@@ -181,13 +185,29 @@ impl Wind<'_> {
 
 /// Velocity of the air of a scene at a point, `time_s` after the scan began: all its winds added.
 pub(crate) fn velocity_m_s(s: &Scene, p: [f64; 3], time_s: f64) -> [f64; 3] {
-    let mut out = Wind(&|key| s.get(&format!("flow.{key}"))).at(p, time_s);
-    for added in s
-        .get("added_flows")
+    let mut out = match s.path() {
+        Some(path) => path.velocity_m_s(p, time_s),
+        None => Wind(&|key| s.get(&format!("flow.{key}"))).at(p, time_s),
+    };
+    for added in added_flows(s) {
+        let more = Wind(&|key| added.get(key).cloned()).at(p, time_s);
+        (0..3).for_each(|i| out[i] += more[i]);
+    }
+    out
+}
+
+fn added_flows(s: &Scene) -> Vec<Value> {
+    let added = s.get("added_flows");
+    added
         .and_then(|v| v.as_array().cloned())
         .unwrap_or_default()
-    {
-        let more = Wind(&|key| added.get(key).cloned()).at(p, time_s);
+}
+
+/// The uniform and the mean winds that are added to a pair, at a height, m/s.
+pub(crate) fn mean_wind_m_s(s: &Scene, z_m: f64) -> [f64; 3] {
+    let mut out = [0.0; 3];
+    for added in added_flows(s) {
+        let more = Wind(&|key| added.get(key).cloned()).at([0.0, 0.0, z_m], 0.0);
         (0..3).for_each(|i| out[i] += more[i]);
     }
     out
@@ -196,7 +216,7 @@ pub(crate) fn velocity_m_s(s: &Scene, p: [f64; 3], time_s: f64) -> [f64; 3] {
 /// How old the flow is when the scan begins, s (V8).
 pub(crate) fn start_s(s: &Scene) -> f64 {
     match s.s("flow.kind") == "vortex_pair"
-        && s.s("flow.motion") == "inviscid"
+        && s.s("flow.motion") != "frozen"
         && s.f("flow.circulation_m2_s") > 0.0
     {
         true => {
@@ -261,7 +281,10 @@ pub(crate) fn radial_m_s(s: &Scene, elevation_rad: f64, time_s: f64, range_m: f6
 }
 
 /// Exact and weighted velocities of a few lines of a map.
-pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
+pub(crate) fn hold(ledger: &mut Ledger, bench: &Bench, s: &Scene, scan: &Scan, map: &Csv) {
+    if let Some(eddies) = Eddies::of(s) {
+        return eddies::hold_map(ledger, bench, s, scan, map, &eddies);
+    }
     let Some(pulse) = Pulse::gaussian(s) else {
         return;
     };
@@ -282,13 +305,19 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
         );
         let air = Line::new(s, e, time_s, first_m, last_m, step_m);
         let fast = air.largest_m_s().max(1e-3);
+        // Both sides integrate the path of a transported pair.
+        let path_m_s = if s.path().is_some() {
+            OF_PATH * fast
+        } else {
+            0.0
+        };
         for gate in (0..gates).step_by(1 + gates / 5) {
             let (row, r) = (line * gates + gate, scan.gate_m[gate]);
             ledger.equal(
                 "map.csv: v_exact_m_s",
                 exact[row],
                 radial_m_s(s, e, time_s, r),
-                1e-11 * fast.max(1.0),
+                1e-11 * fast.max(1.0) + path_m_s,
             );
             // (S11); what the sum of (S7) leaves out bears on the seventh digit.
             let weight = |rho: f64| pulse.power_over_range(r - rho);
@@ -296,7 +325,7 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
                 "map.csv: v_pulse_m_s",
                 of_pulse[row],
                 air.mean(weight),
-                2e-6 * fast,
+                2e-6 * fast + path_m_s,
             );
             // (S12): each sample of the window has the pulse's weight about its own range.
             let samples = &scan.sample_m[scan.gate_start[gate]..];
@@ -311,7 +340,7 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
                 "map.csv: v_gate_m_s",
                 of_gate[row],
                 air.mean(weight),
-                2e-6 * fast,
+                2e-6 * fast + path_m_s,
             );
         }
     }

@@ -1,5 +1,6 @@
 //! Random scenes over all keys, small enough to run in about a second.
 
+use super::draw_air::{atmosphere, flow};
 use super::random::Random;
 use super::scene::Scene;
 
@@ -137,130 +138,6 @@ fn front_end(r: &mut Random, s: &mut Scene) {
     if r.chance(0.4) {
         s.number("detector.front_end.half_power_hz", r.log(5e7, 5e8))
             .set("detector.front_end.poles", r.whole(1, 4));
-    }
-}
-
-fn atmosphere(r: &mut Random, s: &mut Scene) {
-    match r.chance(0.2) {
-        true => s
-            .set(
-                "atmosphere.profile.range_m",
-                "[100.0, 400.0, 900.0, 2000.0]",
-            )
-            .set(
-                "atmosphere.profile.backscatter_per_m_sr",
-                format!(
-                    "[1e-7, {:?}, {:?}, 1e-8]",
-                    r.log(1e-8, 1e-6),
-                    r.log(1e-8, 1e-6)
-                ),
-            )
-            .set(
-                "atmosphere.profile.extinction_per_m",
-                format!("[7e-5, {:?}, 1e-4, 1e-5]", r.log(1e-5, 1e-3)),
-            ),
-        false => s
-            .number("atmosphere.backscatter_per_m_sr", r.log(1e-8, 1e-6))
-            .number("atmosphere.extinction_per_m", r.log(1e-5, 5e-4)),
-    };
-}
-
-pub(crate) fn flow(r: &mut Random, s: &mut Scene) {
-    match r.whole(0, 9) {
-        0..=4 => {
-            s.number("flow.circulation_m2_s", r.log(100.0, 700.0))
-                .number("flow.spacing_m", r.between(20.0, 60.0));
-            s.number("flow.core_radius_m", r.between(1.2, 5.0))
-                .number("flow.lateral_position_m", r.between(370.0, 420.0));
-            s.number("flow.height_m", r.between(25.0, 60.0))
-                .word("flow.profile", r.pick(&["algebraic", "lamb_oseen"]));
-            if r.chance(0.5) {
-                s.word("flow.motion", "inviscid")
-                    .number("flow.age_tau", r.between(0.0, 3.0));
-            }
-            if r.chance(0.5) {
-                s.number("flow.cross_wind_m_s", r.between(-5.0, 5.0));
-            }
-        }
-        5 => {
-            s.word("flow.kind", "calm");
-        }
-        6 => {
-            s.word("flow.kind", "uniform")
-                .number("flow.lateral_m_s", r.between(-10.0, 10.0))
-                .number("flow.vertical_m_s", r.between(-1.0, 1.0));
-        }
-        7 => mean_wind(r, s),
-        _ => {
-            s.word("flow.kind", "linear").set(
-                "flow.velocity_m_s",
-                format!("[1.0, {:?}, 0.1]", r.between(-5.0, 5.0)),
-            );
-            s.set(
-                "flow.gradient_v_per_s",
-                format!(
-                    "[0.0, {:?}, {:?}]",
-                    r.between(-0.02, 0.02),
-                    r.between(-0.02, 0.02)
-                ),
-            );
-            s.set(
-                "flow.acceleration_m_s2",
-                format!("[0.0, {:?}, 0.0]", r.between(-3.0, 3.0)),
-            );
-        }
-    }
-    if r.chance(0.2) {
-        s.set(
-            "added_flows",
-            format!(
-                "[{{ kind = \"uniform\", lateral_m_s = {:?}, vertical_m_s = 0.0 }}]",
-                r.between(-6.0, 6.0)
-            ),
-        );
-    }
-}
-
-/// A mean wind over the height, of each law.
-fn mean_wind(r: &mut Random, s: &mut Scene) {
-    s.word("flow.kind", "wind");
-    match r.whole(0, 3) {
-        0 => {
-            s.number("flow.speed_m_s", r.between(0.0, 12.0))
-                .number("flow.toward_rad", r.between(0.0, 6.0));
-            s.number("flow.roughness_m", r.log(1e-3, 0.3))
-                .number("flow.displacement_m", r.between(0.0, 5.0));
-        }
-        1 => {
-            s.number("flow.friction_velocity_m_s", r.between(0.1, 0.8))
-                .number("flow.roughness_m", r.log(1e-3, 0.3));
-        }
-        2 => {
-            s.word("flow.profile", "power")
-                .number("flow.exponent", r.between(0.0, 0.4));
-            s.number("flow.head_wind_m_s", r.between(-8.0, 8.0))
-                .number("flow.cross_wind_m_s", r.between(-8.0, 8.0));
-        }
-        _ => {
-            // Kinks below the scan: the sums of both sides are good to 1e-6 where the wind is smooth.
-            let first_m = r.between(0.0, 4.0);
-            s.word("flow.profile", "table").set(
-                "flow.height_m",
-                format!("[{first_m:?}, {:?}, 300.0]", first_m + r.between(1.0, 6.0)),
-            );
-            s.set(
-                "flow.speeds_m_s",
-                format!(
-                    "[{:?}, {:?}, 9.0]",
-                    r.between(0.0, 5.0),
-                    r.between(0.0, 9.0)
-                ),
-            );
-            s.set(
-                "flow.towards_rad",
-                format!("[1.0, {:?}, 2.0]", r.between(0.0, 6.0)),
-            );
-        }
     }
 }
 

@@ -45,6 +45,16 @@ const HUFNAGEL: [(&str, &str); 3] = [
     ("atmosphere.turbulence.profile.kind", "\"hufnagel_valley\""),
     ("telescope.receiver", "\"bistatic\""),
 ];
+const CN2_TABLE: [(&str, &str); 5] = [
+    ("atmosphere.turbulence.kind", "\"refractive\""),
+    ("telescope.receiver", "\"bistatic\""),
+    ("atmosphere.turbulence.profile.kind", "\"table\""),
+    ("atmosphere.turbulence.profile.heights_m", "[0.0, 100.0]"),
+    (
+        "atmosphere.turbulence.profile.values_m_m23",
+        "[1e-13, 1e-14]",
+    ),
+];
 const PPI: [(&str, &str); 1] = [("scan.lidar_height_m", "20.0")];
 
 const KEYS: &[Key] = &[
@@ -331,6 +341,13 @@ const KEYS: &[Key] = &[
         "v_mean_m_s",
     ),
     (
+        "atmosphere.aerosol.lidar_ratio_sr",
+        &LAYER,
+        ["30.0", "60.0"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
         "atmosphere.aerosol.ground_backscatter_per_m_sr",
         &LAYER,
         ["1e-6", "2e-6"],
@@ -388,6 +405,36 @@ const KEYS: &[Key] = &[
         "atmosphere.turbulence.profile.ground_cn2_m_m23",
         &HUFNAGEL,
         ["1e-14", "1e-13"],
+        "budget",
+        "",
+    ),
+    (
+        // Its term of the wind is felt high up alone.
+        "atmosphere.turbulence.profile.high_wind_m_s",
+        &[
+            ("atmosphere.turbulence.kind", "\"refractive\""),
+            ("atmosphere.turbulence.profile.kind", "\"hufnagel_valley\""),
+            ("telescope.receiver", "\"bistatic\""),
+            ("scan.elevation_min_rad", "1.4"),
+            ("scan.elevation_max_rad", "1.45"),
+            ("scan.range_min_m", "8000.0"),
+            ("scan.range_max_m", "8500.0"),
+        ],
+        ["21.0", "150.0"],
+        "budget",
+        "",
+    ),
+    (
+        "atmosphere.turbulence.profile.heights_m",
+        &CN2_TABLE,
+        ["[0.0, 100.0]", "[0.0, 60.0]"],
+        "budget",
+        "",
+    ),
+    (
+        "atmosphere.turbulence.profile.values_m_m23",
+        &CN2_TABLE,
+        ["[1e-13, 1e-14]", "[1e-13, 5e-14]"],
         "budget",
         "",
     ),

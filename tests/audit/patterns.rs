@@ -2,6 +2,8 @@
 
 use super::air::velocity_m_s;
 use super::draw;
+use super::draw_air;
+use super::eddies::Eddies;
 use super::fields;
 use super::ledger::Ledger;
 use super::program::Bench;
@@ -107,6 +109,9 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         let mut g = || r.between(-5e-3, 5e-3);
         let list = format!("[{:?}, {:?}, {:?}]", g(), g(), g());
         s.set(&format!("flow.{key}"), list);
+    }
+    if r.chance(0.25) {
+        draw_air::add(&mut s, &[("eddies", draw_air::eddies(r, false))]);
     }
     let kind = r.pick(&["ppi", "vad", "dbs", "stare", "axial", "list"]);
     s.word("scan.pattern.kind", kind);
@@ -227,6 +232,7 @@ fn hold_map(ledger: &mut Ledger, bench: &Bench, s: &Scene, lines: &[(f64, f64)])
         f("v_pulse_m_s"),
     );
     let v = s.list("scan.lidar.velocity_m_s");
+    let turbulent_m_s = Eddies::of(s).map_or(0.0, |eddies| 6.0 * eddies.deviation_m_s());
     for row in 0..map.len() {
         let (line, gate) = (row / gates, row % gates);
         let (az, el) = lines[line];
@@ -261,14 +267,14 @@ fn hold_map(ledger: &mut Ledger, bench: &Bench, s: &Scene, lines: &[(f64, f64)])
             "map.csv: v_exact_m_s, of a pattern",
             exact[row],
             right,
-            1e-7,
+            1e-7 + turbulent_m_s,
         );
         // A linear wind is its own mean.
         ledger.equal(
             "map.csv: v_pulse_m_s, of a pattern",
             pulse[row],
             right,
-            1e-6,
+            1e-6 + turbulent_m_s,
         );
         ledger.equal("map.csv: x_m", places[0][row], at[0], 1e-6);
     }

@@ -168,12 +168,67 @@ pub(crate) fn independent_efficiency(s: &Scene, range_m: f64) -> f64 {
     let beam = Beam::new(s);
     // Structure function of a plane wave over k^2 C_n^2 R rho^(5/3).
     const PLANE: f64 = 2.914_381;
-    let of_path = 0.375 * PLANE * beam.k.powi(2) * s.f("atmosphere.turbulence.cn2_m_m23") * range_m;
+    let of_path = PLANE * beam.k.powi(2) * spherical_cn2_m13(s, range_m);
     beam.efficiency(range_m, |rho| of_path * rho.powf(5.0 / 3.0))
 }
 
-/// K^2 beta at a range: backscatter, and extinction out and back.
+/// Integral of C_n^2 along the line in the middle of the scan with the weight of a spherical wave, m^(1/3).
+fn spherical_cn2_m13(s: &Scene, range_m: f64) -> f64 {
+    let lines = Scan::new(s).elevation_rad;
+    let (sin, foot_m) = (lines[lines.len() / 2].sin(), s.f("scan.lidar_height_m"));
+    let key = |name: &str| format!("atmosphere.turbulence.profile.{name}");
+    let (heights_m, values) = (s.list(&key("heights_m")), s.list(&key("values_m_m23")));
+    let cn2 = |along_m: f64| {
+        let z = foot_m + along_m * sin;
+        match s.s(&key("kind")).as_str() {
+            "table" => straight(&heights_m, &values, z),
+            "hufnagel_valley" => {
+                let wind = (s.f(&key("high_wind_m_s")) / 27.0).powi(2);
+                0.00594 * wind * (1e-5 * z).powi(10) * (-z / 1000.0).exp()
+                    + 2.7e-16 * (-z / 1500.0).exp()
+                    + s.f(&key("ground_cn2_m_m23")) * (-z / 100.0).exp()
+            }
+            _ => s.f("atmosphere.turbulence.cn2_m_m23"),
+        }
+    };
+    let kinks: Vec<f64> = heights_m.iter().map(|z| (z - foot_m) / sin).collect();
+    let weighted = |x: f64| cn2(x) * (1.0 - x / range_m).powf(5.0 / 3.0);
+    let ends = between(0.0, range_m, &kinks);
+    ends.windows(2)
+        .map(|ends| integral(ends[0], ends[1], 60, weighted))
+        .sum()
+}
+
+/// Backscatter at a height, 1/(m sr), of an aerosol that is stated by its kind.
+fn aerosol_per_m_sr(s: &Scene, height_m: f64) -> f64 {
+    let f = |key: &str| s.f(&format!("atmosphere.aerosol.{key}"));
+    if s.s("atmosphere.aerosol.kind") == "visibility" {
+        let km = 1e-3 * f("visibility_m");
+        let q = match km {
+            _ if km > 50.0 => 1.6,
+            _ if km > 6.0 => 1.3,
+            _ => 0.16 * km + 0.34,
+        };
+        let of_wavelength = (s.f("laser.wavelength_m") / 0.55e-6).powf(-q);
+        return 3.912 / km * of_wavelength / 1000.0 / f("lidar_ratio_sr");
+    }
+    let step = 0.5 * (1.0 + ((height_m - f("top_m")) / f("step_m")).tanh());
+    let below = f("ground_backscatter_per_m_sr") * (-height_m / f("scale_height_m")).exp();
+    let above_m = (height_m - f("top_m")).max(0.0);
+    let above = f("above_backscatter_per_m_sr") * (-above_m / 2000.0).exp();
+    (1.0 - step) * below + step * above
+}
+
+/// K^2 beta at a range of the line in the middle of the scan: backscatter, and extinction out and back.
 fn air(s: &Scene, range_m: f64) -> (f64, f64) {
+    if s.has("atmosphere.aerosol") {
+        let lines = Scan::new(s).elevation_rad;
+        let sin = lines[lines.len() / 2].sin();
+        let beta = |r: f64| aerosol_per_m_sr(s, s.f("scan.lidar_height_m") + r * sin);
+        let panels = 2 + (range_m / 20.0) as usize;
+        let depth = s.f("atmosphere.aerosol.lidar_ratio_sr") * integral(0.0, range_m, panels, beta);
+        return (beta(range_m), (-2.0 * depth).exp());
+    }
     if !s.has("atmosphere.profile") {
         let (beta, alpha) = (
             s.f("atmosphere.backscatter_per_m_sr"),

@@ -32,9 +32,14 @@ impl Ended {
 impl Bench<'_> {
     /// Runs a command on one thread.
     pub(crate) fn run(&self, words: &[&str]) -> Ended {
+        self.run_on("1", words)
+    }
+
+    /// Runs a command on a number of threads.
+    pub(crate) fn run_on(&self, threads: &str, words: &[&str]) -> Ended {
         let done = Command::new(self.program)
             .args(words)
-            .args(["--threads", "1", "--quiet"])
+            .args(["--threads", threads, "--quiet"])
             .current_dir(&self.folder)
             .stdin(Stdio::null())
             .output()
@@ -115,6 +120,11 @@ impl Csv {
 
     pub(crate) fn len(&self) -> usize {
         self.rows.len()
+    }
+
+    /// Whether all cells of another table are the same.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        self.names == other.names && self.rows == other.rows
     }
 
     pub(crate) fn has(&self, name: &str) -> bool {

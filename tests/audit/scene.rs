@@ -1,5 +1,6 @@
 //! A scene as its keys: what a draw states, and the defaults of the book (docs/src/scene.md) for all others.
 
+use super::pair::Path;
 use std::fmt::Display;
 use std::sync::{LazyLock, OnceLock};
 use toml::{Table, Value};
@@ -46,12 +47,15 @@ pub(crate) struct Scene {
     keys: Vec<(String, String)>,
     /// The same, read.
     stated: OnceLock<Table>,
+    /// The path of its pair, if that is transported.
+    path: OnceLock<Option<Path>>,
 }
 
 impl Scene {
     /// States a number, a list or a table, as it stands in TOML.
     pub(crate) fn set(&mut self, key: &str, value: impl Display) -> &mut Self {
         self.stated = OnceLock::new();
+        self.path = OnceLock::new();
         let value = value.to_string();
         match self.keys.iter_mut().find(|(known, _)| known == key) {
             Some((_, old)) => *old = value,
@@ -73,6 +77,7 @@ impl Scene {
     /// Takes a key, and all below it, back.
     pub(crate) fn unset(&mut self, key: &str) -> &mut Self {
         self.stated = OnceLock::new();
+        self.path = OnceLock::new();
         self.keys
             .retain(|(known, _)| known != key && !known.starts_with(&format!("{key}.")));
         self
@@ -94,6 +99,11 @@ impl Scene {
         below(stated, key).or_else(|| below(&READ, key))
     }
 
+    /// The path of the pair of its flow, if that decays and moves by the mean wind alone.
+    pub(crate) fn path(&self) -> Option<&Path> {
+        self.path.get_or_init(|| Path::of(self)).as_ref()
+    }
+
     pub(crate) fn has(&self, key: &str) -> bool {
         self.get(key).is_some()
     }
@@ -113,6 +123,11 @@ impl Scene {
         self.get(key)
             .and_then(|v| v.as_str().map(str::to_owned))
             .unwrap_or_default()
+    }
+
+    /// Whether a key is stated as true.
+    pub(crate) fn is_true(&self, key: &str) -> bool {
+        self.get(key).and_then(|v| v.as_bool()) == Some(true)
     }
 
     /// A list of numbers.
