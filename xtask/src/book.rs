@@ -82,6 +82,7 @@ fn draw_gallery(pages: &Path) -> Outcome {
     let folder = pages.join(GALLERY);
     std::fs::create_dir_all(&folder)?;
     let wakescope = program(None)?;
+    write_scenes(&std::fs::read_to_string(pages.join("airport.md"))?, &folder)?;
     let page = std::fs::read_to_string(pages.join("gallery.md"))?;
     for line in page.lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -101,6 +102,18 @@ fn draw_gallery(pages: &Path) -> Outcome {
             && path.extension().is_some_and(|end| end == "svg")
         {
             std::fs::copy(&path, folder.join(name))?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes the scenes of a page, each with its name in its first line, into a folder.
+fn write_scenes(page: &str, folder: &Path) -> Outcome {
+    for rest in page.split("```toml\n# ").skip(1) {
+        if let Some((block, _)) = rest.split_once("```")
+            && let Some((name, scene)) = block.split_once('\n')
+        {
+            std::fs::write(folder.join(name), scene)?;
         }
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! What the book, the README and the crates' READMEs show and name: commands, scenes, options and keys are those of the program.
 
 use super::wakescope;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Tables at the top of a scene.
@@ -130,17 +130,11 @@ fn commands_of_the_readme_and_the_tutorials_print_what_the_pages_show() {
         ("README.md", 3),
         ("docs/src/tutorial-cfradial.md", 4),
         ("docs/src/tutorial-signals.md", 4),
+        ("docs/src/airport.md", 5),
     ] {
         let page = std::fs::read_to_string(root().join(name)).unwrap();
         let temp = tempfile::tempdir().unwrap();
-        for block in blocks(&page, "toml") {
-            let file = block
-                .lines()
-                .next()
-                .and_then(|line| line.strip_prefix("# "))
-                .unwrap();
-            std::fs::write(temp.path().join(file), block).unwrap();
-        }
+        write_scenes(&page, temp.path());
         let lines = blocks(&page, "sh").into_iter().flat_map(str::lines);
         let commands: Vec<&str> = lines.filter(|line| !line.starts_with("cargo ")).collect();
         assert!(commands.len() >= least, "{name}: {commands:?}");
@@ -154,14 +148,76 @@ fn commands_of_the_readme_and_the_tutorials_print_what_the_pages_show() {
             assert!(out.status.success(), "{name}: {command}: {complaint}");
             printed += &String::from_utf8_lossy(&out.stdout);
         }
-        let shown: Vec<&str> = page
-            .lines()
-            .filter(|line| line.starts_with("scan "))
+        let shown: Vec<&str> = blocks(&page, "text")
+            .into_iter()
+            .flat_map(str::lines)
+            .filter(|line| !line.starts_with("wakescope "))
             .collect();
-        assert!(!shown.is_empty() || name.ends_with("signals.md"), "{name}");
+        assert!(!shown.is_empty(), "{name}");
         for line in shown {
             assert!(printed.contains(line), "{name}: {line}\nnot in\n{printed}");
         }
+        if name.ends_with("airport.md") {
+            check_winds(&page, temp.path());
+        }
+    }
+}
+
+/// Writes the scenes of a page, each with its name in its first line, into a folder.
+fn write_scenes(page: &str, folder: &Path) {
+    for block in blocks(page, "toml") {
+        let first = block.lines().next().unwrap();
+        let file = first.strip_prefix("# ").unwrap();
+        std::fs::write(folder.join(file), block).unwrap();
+    }
+}
+
+/// Rows of a table that the program wrote, by the names of their columns.
+fn rows(path: &Path) -> Vec<BTreeMap<String, f64>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let cells = |line: &str| -> BTreeMap<String, f64> {
+        let values = line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN));
+        names
+            .iter()
+            .map(|name| name.to_string())
+            .zip(values)
+            .collect()
+    };
+    lines.map(cells).collect()
+}
+
+/// The table of winds of the page has the numbers of the files.
+fn check_winds(page: &str, folder: &Path) {
+    let found = rows(&folder.join("air/wind.csv"));
+    let truth = rows(&folder.join("cone/wind.csv"));
+    let mut lines = Vec::new();
+    for (row, truth) in found.iter().zip(&truth) {
+        let wind = |name: &str| {
+            let value = row[&format!("{name}_m_s")];
+            let std = row[&format!("{name}_std_m_s")];
+            let exact = truth[&format!("{name}_true_m_s")];
+            format!("{value:.2} ± {std:.2}, {exact:.2}")
+        };
+        lines.push(format!(
+            "| {:.1} | {} | {} | {:.3}, {:.3} to {:.3} |",
+            row["height_m"],
+            wind("east"),
+            wind("north"),
+            row["edr_m23_s"],
+            row["edr_low_m23_s"],
+            row["edr_high_m23_s"],
+        ));
+    }
+    let is_number = |line: &&str| line.starts_with("| ") && line.contains('±');
+    let shown: Vec<&str> = page.lines().filter(is_number).collect();
+    assert!(shown.len() >= 2);
+    for line in shown {
+        assert!(
+            lines.iter().any(|own| own == line),
+            "{line}\nnot in\n{lines:#?}"
+        );
     }
 }
 
@@ -170,6 +226,8 @@ fn commands_of_the_readme_and_the_tutorials_print_what_the_pages_show() {
 fn commands_of_the_gallery_make_its_pictures() {
     let page = std::fs::read_to_string(root().join("docs/src/gallery.md")).unwrap();
     let temp = tempfile::tempdir().unwrap();
+    let airport = std::fs::read_to_string(root().join("docs/src/airport.md")).unwrap();
+    write_scenes(&airport, temp.path());
     for line in page.lines().filter(|line| line.starts_with("wakescope ")) {
         let words: Vec<&str> = line.split_whitespace().skip(1).collect();
         let out = wakescope(temp.path(), &[&words[..], &["--quiet"]].concat());
@@ -184,7 +242,7 @@ fn commands_of_the_gallery_make_its_pictures() {
             pictures += 1;
         }
     }
-    assert!(pictures >= 8, "{pictures}");
+    assert!(pictures >= 11, "{pictures}");
 }
 
 /// With `--help` at its end a line is parsed and nothing runs.
