@@ -198,7 +198,7 @@ fn sign_folds_masks_and_ragged_gates_follow_the_file() {
             .0
             .insert("VEL", (shape, vec![(attribute, remark)], values));
         let found = read(&remarked).unwrap().0.remove(0).map;
-        assert_eq!(found.velocity_m_s[[4, 5]], velocity_m_s, "{remark}");
+        assert_eq!(found.velocity_m_s[[5, 5]], velocity_m_s, "{remark}");
     }
     // The same gates one ray after the other, the last gate of the first ray missing.
     let mut ragged = made();
