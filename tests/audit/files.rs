@@ -86,6 +86,7 @@ pub(crate) fn hold_signals(
         nc.f("radial_velocity"),
         nc.f("line_elevation"),
     );
+    let turbulent_m_s = Eddies::of(s).map_or(0.0, |eddies| 6.0 * eddies.deviation_m_s());
     for line in 0..elevation.len() {
         ledger.equal(
             "signals.nc: line_elevation",
@@ -100,13 +101,17 @@ pub(crate) fn hold_signals(
                 && range[range.len() - 1] > scan.sample_m[samples - 1] + 0.5 * reach_m,
             "layers end before the pulse does",
         );
+        // The path of a pair that meanders depends on the waves.
+        if s.is_true("flow.meander") {
+            continue;
+        }
         for l in (0..range.len()).step_by(1 + range.len() / 10) {
             let right = radial_m_s(s, scan.elevation_rad[line], line_time_s(s, line), range[l]);
             ledger.equal(
                 "signals.nc: radial_velocity",
                 velocity[line * range.len() + l],
                 right,
-                1e-6 * right.abs().max(1.0),
+                1e-6 * right.abs().max(1.0) + turbulent_m_s,
             );
         }
     }
