@@ -7,7 +7,7 @@ use ndarray::Array2;
 use crate::retrieval::{ScanMap, Turbulence};
 use crate::vortex_fit::map_fit::data::{median, robust_scale};
 
-/// A velocity this number of standard deviations off the median of its neighbours is an outlier: noise is once in a million.
+/// Standard deviations off the median of its neighbours from which a velocity is an outlier: noise exceeds it once in a million.
 const FAR: f64 = 5.0;
 /// Deviation of a normal number less the median of eight others, over its own.
 const WITH_MEDIAN: f64 = 1.09;

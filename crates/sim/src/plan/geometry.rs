@@ -12,7 +12,7 @@ use wakescope_signal::{LayerLimits, Pulse};
 
 /// Layers of scenes with a transported pair are this many times as thick as the rule of
 /// [`Pulse::layer_thickness_m`] has them. The covariance of a record is a sum over layers that converges exponentially: with cores
-/// of 1.3 m it is then within 1 % of the power, and the mean of a spectrum within 0.001 m/s (`measure/scan/layers.rs`).
+/// of 1.3 m it is then within 2 % of the power, and the mean of a spectrum within 0.001 m/s (`measure/scan/layers.rs`).
 const TRANSPORTED_THICKNESS: f64 = 4.0;
 
 /// The sampling of one scan in angle, range and time.
