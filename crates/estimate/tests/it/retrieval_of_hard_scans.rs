@@ -1,6 +1,6 @@
 //! Hard scans: gates that are long against the spacing, velocities that share windows, scans without noise or of another unit.
 
-use super::retrieval::*;
+use super::retrieval_cases::*;
 use crate::fixtures::normal;
 use ndarray::Array2;
 use rand::SeedableRng;

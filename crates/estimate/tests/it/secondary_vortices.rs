@@ -1,7 +1,7 @@
 //! Secondary vortices: found beside their vortices where a scan shows them, and nowhere else.
 
 use crate::fixtures::{normal, table_2};
-use crate::retrieval::{case, thinned, turbulence_factor, with_outliers};
+use crate::retrieval_cases::{case, thinned, turbulence_factor, with_outliers};
 use crate::vortex_fit::SIGMA_S;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
