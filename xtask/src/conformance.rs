@@ -99,7 +99,9 @@ fn check_sizes(files: &[(String, Vec<u8>)]) -> Outcome {
 fn manifest(files: &[SetFile]) -> String {
     let mut out = String::from("file,format,case,bytes,sha256\n");
     for file in files {
-        let (name, format, case) = (&file.name, file.format, file.case);
+        let name = &file.name;
+        let format = file.format;
+        let case = file.case;
         // Writing to a text cannot fail.
         let _ = write!(out, "{name},{format},{case},{},", file.bytes.len());
         for byte in Sha256::digest(&file.bytes) {

@@ -351,9 +351,8 @@ mod tests {
             "c/src/a/mod.rs",
             "mod b;\npub(in super::super) fn f() { b::c::g() }\n",
         );
-        let (between, below) = (("c/src/a/b/mod.rs", "pub mod c;\n"), |text| {
-            ("c/src/a/b/c.rs", text)
-        });
+        let between = ("c/src/a/b/mod.rs", "pub mod c;\n");
+        let below = |text| ("c/src/a/b/c.rs", text);
         let circle = [["c/src/a/b/c.rs", "c/src/a/mod.rs"]];
         assert_eq!(
             found(

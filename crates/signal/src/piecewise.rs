@@ -255,7 +255,10 @@ mod tests {
 
     #[test]
     fn moments_are_those_of_a_chirped_gaussian() {
-        let (sigma, chirp, offset, delay) = (1.3, 0.4, 0.7, 0.5);
+        let sigma = 1.3;
+        let chirp = 0.4;
+        let offset = 0.7;
+        let delay = 0.5;
         let f = |t: f64| {
             let x = t - delay;
             Complex::from_polar(

@@ -446,7 +446,8 @@ mod tests {
 
     #[test]
     fn power_integrates_to_one_and_is_the_square_of_the_envelope() {
-        let (pulse, step_s) = (gaussian(), 10e-9);
+        let pulse = gaussian();
+        let step_s = 10e-9;
         let times = (-200..=200).map(|i| f64::from(i) * step_s);
         let sum: f64 = times
             .clone()
@@ -461,7 +462,8 @@ mod tests {
 
     #[test]
     fn range_weight_integrates_to_one_and_its_half_width_is_half_the_pulse_length() {
-        let (pulse, step_m) = (Pulse::from(gaussian()), 1.5);
+        let pulse = Pulse::from(gaussian());
+        let step_m = 1.5;
         let sum: f64 = (-200..=200)
             .map(|i| pulse.range_weight_per_m(f64::from(i) * step_m) * step_m)
             .sum();

@@ -80,7 +80,9 @@ fn middle_m(plan: &Plan) -> f64 {
 /// What the crates refuse; a checked scene gives none.
 pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let mut result = RunResult::default();
-    let (o, known, mut there) = (&plan.scene().outputs, EfficiencyMemo::default(), None);
+    let o = &plan.scene().outputs;
+    let known = EfficiencyMemo::default();
+    let mut there = None;
     let optics = LineOptics {
         plan,
         instrument: &plan.instrument,

@@ -214,7 +214,8 @@ mod tests {
         ] {
             let plan = of(words);
             // Each line at every five centimetres.
-            let (scan, schedule) = (&plan.scene().scan, &plan.geometry.schedule);
+            let scan = &plan.scene().scan;
+            let schedule = &plan.geometry.schedule;
             let mut dense_m_s = 0.0_f64;
             for line in 0..schedule.lines.len() {
                 let beam = schedule.middle(line);

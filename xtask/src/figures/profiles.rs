@@ -198,7 +198,8 @@ pub(super) fn width_m(across: &[(f64, f64)]) -> f64 {
 /// Where a curve first falls below a level, on the straight line between its points; NaN if it does not.
 fn fall_to(level: f64, curve: &[(f64, f64)]) -> f64 {
     for pair in curve.windows(2) {
-        let (from, to) = (pair[0], pair[1]);
+        let from = pair[0];
+        let to = pair[1];
         if to.1 < level {
             return from.0 + (to.0 - from.0) * (from.1 - level) / (from.1 - to.1);
         }

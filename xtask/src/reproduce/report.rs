@@ -516,7 +516,8 @@ mod tests {
             row: Row::ALL,
             make,
         };
-        let (drawn, listed) = (figure("fig01"), figure("tab01"));
+        let drawn = figure("fig01");
+        let listed = figure("tab01");
         let claim = |id: &str| Claim {
             statement: WILD.into(),
             expected: WILD.into(),
@@ -547,7 +548,10 @@ mod tests {
             (&listed, rendered("csv", &rows)),
         ];
         change(&mut done);
-        let (stages, anew, wake, analytic) = (".".into(), false, None, false);
+        let stages = ".".into();
+        let anew = false;
+        let wake = None;
+        let analytic = false;
         html(
             &Context {
                 profile: Profile::Quick,

@@ -557,7 +557,8 @@ mod tests {
         for gates in [1, 10] {
             let of =
                 |samples: usize, pulses: usize| test(samples).region([(gates, pulses)].into_iter());
-            let (one, four) = (of(1024, 1), of(256, 4));
+            let one = of(1024, 1);
+            let four = of(256, 4);
             assert!(
                 (one.shape / four.shape - 1.0).abs() < 0.03
                     && (one.scale / four.scale - 1.0).abs() < 0.03
@@ -592,10 +593,8 @@ mod tests {
         assert!(
             test.threshold(&window, 1.0).is_err() && test.threshold(&window, f64::NAN).is_err()
         );
-        let (taper, other) = (
-            Taper::unit(vec![1.0; 8]).unwrap(),
-            Taper::unit(vec![1.0; 4]).unwrap(),
-        );
+        let taper = Taper::unit(vec![1.0; 8]).unwrap();
+        let other = Taper::unit(vec![1.0; 4]).unwrap();
         let gates = Gates::new(8, 1, 0.0).unwrap();
         let of = |tapers: &[Taper], lags: Option<&[f64]>, gates: &Gates| {
             NoiseTest::new(&table_2(), gates, tapers, lags, 64, Noise::White)
@@ -645,7 +644,8 @@ mod tests {
         );
         for samples in [4, 16, 64] {
             let band = |step| of_two(samples, step, Noise::Band { floor: 1e-3 }).abs();
-            let (near, far) = (band(2 * samples), band(1_000_000_000));
+            let near = band(2 * samples);
+            let far = band(1_000_000_000);
             // Four samples apart it remembers.
             assert!(
                 far < 5e-4 && (samples > 4 || near > 1e-2),

@@ -19,7 +19,10 @@ macro_rules! case {
                 $draw(rng)
             }
             fn heev(jobz: u8, uplo: u8, n: i32, a: &mut [Self], lda: i32, w: &mut [f64]) -> i32 {
-                let (mut info, mut query, jobz, uplo) = (77, [Self::from_real(0.0)], jobz as c_char, uplo as c_char);
+                let mut info = 77;
+                let mut query = [Self::from_real(0.0)];
+                let jobz = jobz as c_char;
+                let uplo = uplo as c_char;
                 // SAFETY: a workspace query touches only `query` and `info`
                 unsafe {
                     $heev(&jobz, &uplo, &n, std::ptr::null_mut(), &lda, std::ptr::null_mut(),

@@ -312,7 +312,8 @@ mod tests {
             }
             map.statistics()[0]
         };
-        let (forward, backward) = (run(&mut errors.iter()), run(&mut errors.iter().rev()));
+        let forward = run(&mut errors.iter());
+        let backward = run(&mut errors.iter().rev());
         assert_relative_eq!(
             forward.bias_m_s,
             backward.bias_m_s,

@@ -160,7 +160,8 @@ mod tests {
         let wind = Wake::from_array(&[0.0, 0.0, 90.0, 20.0, 110.0, 20.0, 1.0, 1.0, 2.0, 0.1]);
         let found = expected_velocities(&map, &RetrievalOptions::default(), &wind, true).unwrap();
         let at = |line: usize, gate: usize| {
-            let (angle, range_m) = (map.elevation_rad[line], map.range_m[gate]);
+            let angle = map.elevation_rad[line];
+            let range_m = map.range_m[gate];
             (2.0 + 0.1 * range_m * angle.sin()) * angle.cos()
         };
         for ((line, gate), velocity) in found.indexed_iter() {

@@ -241,7 +241,8 @@ mod tests {
             }
             worst
         };
-        let (coarse, fine) = (error(16), error(32));
+        let coarse = error(16);
+        let fine = error(32);
         let order = (coarse / fine).log2();
         assert!(
             order > 2.8 && fine < 5e-3,
@@ -299,10 +300,8 @@ mod tests {
 
     #[test]
     fn directions_of_one_cell_do_not_vary() {
-        let (thin, wide) = (
-            || Direction::thin(0.5),
-            || Direction::periodic(12, 0.0, 1.0),
-        );
+        let thin = || Direction::thin(0.5);
+        let wide = || Direction::periodic(12, 0.0, 1.0);
         let plane = start(thin(), wide(), wide(), |[_, y, z]| {
             [1.0, (TAU * z).sin(), (TAU * y).sin()]
         });

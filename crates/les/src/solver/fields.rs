@@ -264,7 +264,8 @@ mod tests {
                     assert!((a - b).abs() < 1e-12);
                 }
                 let centred = flow.whole(flow.own_centre_velocity_m_s(direction));
-                let (y_m, z_m) = (flow.mesh().centre_m(1), flow.mesh().centre_m(2));
+                let y_m = flow.mesh().centre_m(1);
+                let z_m = flow.mesh().centre_m(2);
                 for (place, value) in centred.iter().enumerate() {
                     let expected = field([0.5, y_m[place % n], z_m[place / n]])[direction];
                     worst = worst.max((value - expected).abs());

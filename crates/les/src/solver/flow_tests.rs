@@ -25,10 +25,12 @@ fn rough(at_m: [f64; 3]) -> [f64; 3] {
 fn production(flow: &Flow) -> (f64, [f64; 3]) {
     let shape = flow.layout.shape;
     let velocity = flow.state.velocity.each_ref().map(|field| &field[..]);
-    let (mut energy, mut energy_moduli) = (0.0, 0.0);
+    let mut energy = 0.0;
+    let mut energy_moduli = 0.0;
     let mut momentum = [0.0; 3];
     for axis in 0..3 {
-        let (mut sum, mut moduli) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut moduli = 0.0;
         let mut scratch = Scratch::new(shape.n[0]);
         for k in 0..shape.n[2] {
             for j in 0..shape.n[1] {
@@ -127,7 +129,8 @@ fn flows_that_do_not_vary_along_x_are_plane_flows_bit_for_bit() {
         for cells in [4, 8] {
             let deep = run(Direction::periodic(cells, 0.0, 0.7));
             for d in 0..3 {
-                let (plane, deep) = (plane.face_velocity_m_s(d), deep.face_velocity_m_s(d));
+                let plane = plane.face_velocity_m_s(d);
+                let deep = deep.face_velocity_m_s(d);
                 for (place, value) in deep.iter().enumerate() {
                     let expected = plane[place / cells];
                     assert!(

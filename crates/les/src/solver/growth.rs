@@ -495,7 +495,8 @@ mod tests {
         for _ in 0..20 {
             flow.step().unwrap();
         }
-        let (start, steps) = (energy(&flow), 100);
+        let start = energy(&flow);
+        let steps = 100;
         for _ in 0..steps {
             flow.step().unwrap();
         }

@@ -110,7 +110,8 @@ mod tests {
                 let largest = literal
                     .iter()
                     .fold(0.0_f64, |most, value| most.max(value.abs()));
-                let (ops, mut scratch) = (ComponentOperators::new(&layout, a), Scratch::new(n0));
+                let ops = ComponentOperators::new(&layout, a);
+                let mut scratch = Scratch::new(n0);
                 for (j, k) in (0..n2).flat_map(|k| (0..n1).map(move |j| (j, k))) {
                     scratch.convection(&ops, velocity, j, k);
                     let mut fresh = Scratch::new(n0);

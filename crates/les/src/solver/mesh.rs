@@ -495,7 +495,8 @@ mod tests {
                 "{strength} at {place}: {h}"
             );
             for xi in [0.0, 0.5, 3.0, 77.5] {
-                let (a, b) = (direction.at(xi), direction.at(xi + 200.0));
+                let a = direction.at(xi);
+                let b = direction.at(xi + 200.0);
                 assert!(
                     (a.0 + 1.0 - b.0).abs() < 1e-13 && (a.1 / b.1 - 1.0).abs() < 1e-12,
                     "{a:?} {b:?}"

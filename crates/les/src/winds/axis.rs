@@ -391,7 +391,8 @@ mod tests {
             .filter(|l| !l.starts_with('#') && !l.starts_with('x'))
         {
             let row: Vec<Option<f64>> = line.split(',').map(|v| v.trim().parse().ok()).collect();
-            let (x, w) = (row[0].unwrap(), row[1].unwrap());
+            let x = row[0].unwrap();
+            let w = row[1].unwrap();
             assert_abs_diff_eq!(m4_prime(x), w, epsilon = 1e-15);
             assert_abs_diff_eq!(m4_prime(-x), w, epsilon = 1e-15);
             rows.0 += 1;

@@ -274,7 +274,8 @@ mod tests {
     #[test]
     fn largest_line_gradient_is_that_found_by_search_over_radius_and_direction() {
         for profile in profiles() {
-            let (gamma, core) = (500.0, 2.35);
+            let gamma = 500.0;
+            let core = 2.35;
             let velocity = |y: f64, z: f64| {
                 let omega = profile.angular_velocity_rad_s(gamma, core, y * y + z * z);
                 [-omega * z, omega * y]

@@ -333,7 +333,8 @@ mod tests {
         let range_m = [40.0, 300.0, 500.0, 900.0, 3000.0];
         for cn2 in [UNIFORM, Cn2Path::None] {
             let p = path(&layers, &range_m, &cn2);
-            let (mut at, mut seen) = (0.0, 0);
+            let mut at = 0.0;
+            let mut seen = 0;
             for leg in &p.legs {
                 if let Some(Tap {
                     range: output,

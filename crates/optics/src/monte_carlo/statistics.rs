@@ -246,7 +246,8 @@ mod tests {
                 dx_m: 1.0,
                 dy_m: 1.0,
             };
-            let (a, b) = (plane(&grid, 6.0, 1.0), plane(&grid, 9.0, 2.0));
+            let a = plane(&grid, 6.0, 1.0);
+            let b = plane(&grid, 9.0, 2.0);
             let exact: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
             for folding in [Folding::new(&grid, true), Folding::new(&grid, false)] {
                 let mut planes = [vec![0.0; folding.points()], vec![0.0; folding.points()]];
@@ -304,7 +305,8 @@ mod tests {
         }
         let (mean, error) = bistatic(&samples, folding.overlap(&total, &total), &folding, 1.0);
         let pairs = |left_out: Option<usize>| {
-            let (mut sum, mut count) = (0.0, 0.0);
+            let mut sum = 0.0;
+            let mut count = 0.0;
             for i in (0..7).filter(|i| Some(*i) != left_out) {
                 for j in (0..7).filter(|j| Some(*j) != left_out && *j != i) {
                     sum += planes[i]
@@ -336,7 +338,8 @@ mod tests {
         };
         let folding = Folding::new(&grid, false);
         let speckled = |i: usize| {
-            let (height, angle) = (3 * i % 7, 2.4 * i as f64);
+            let height = 3 * i % 7;
+            let angle = 2.4 * i as f64;
             let a = height as f64 / 7.0;
             let mut out = plane(&grid, 9.0, 0.8 + 0.4 * a);
             for (at, value) in out.iter_mut().enumerate() {

@@ -321,7 +321,8 @@ mod tests {
 
     #[test]
     fn gap_is_that_of_the_two_exact_efficiencies() {
-        let (telescope, none) = (Telescope::table2(), crate::Misalignment::NONE);
+        let telescope = Telescope::table2();
+        let none = crate::Misalignment::NONE;
         let turbulence = Turbulence::table2(1e-13).unwrap();
         let table = StructureTable::new(&*turbulence.spectrum);
         let gaps = Gaps::new(

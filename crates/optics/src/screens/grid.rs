@@ -284,7 +284,8 @@ mod tests {
             block.copy_from_slice(&field[first * 17..first * 17 + block.len()]);
         });
         let mut found = Complex::default();
-        let (kx, ky) = (5usize, 3usize);
+        let kx = 5usize;
+        let ky = 3usize;
         let mut out = field.clone();
         fft.filter_y(&mut work, [&mut out[..]], |_, first, block| {
             if (first..first + block.len() / 23).contains(&kx) {

@@ -211,7 +211,9 @@ mod tests {
     /// Relative error of the field after 600 m against the closed form, phase (Gouy's too) and
     /// width included.
     fn gaussian_error(grid: Grid) -> f64 {
-        let (lambda, s, z) = (1.55e-6, 0.02, 600.0);
+        let lambda = 1.55e-6;
+        let s = 0.02;
+        let z = 600.0;
         let propagator = Propagator::<f64>::new(grid, lambda).unwrap();
         let mut work = propagator.work();
         let mut field = gaussian(&grid, s);

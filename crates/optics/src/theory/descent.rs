@@ -229,7 +229,8 @@ mod tests {
             // From inside to the end of the arc, and the whole disc.
             for (low, high) in [(0.004, 0.043), (-0.057, 0.043), (-0.057, 0.01)] {
                 for kappa in [8e3, 3e4] {
-                    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+                    let middle = 0.5 * (low + high);
+                    let half = 0.5 * (high - low);
                     let panels = rule.composite(-0.5 * PI, 0.5 * PI, 800, |theta: f64| {
                         let x = middle + half * theta.sin();
                         let y = (0.05f64.powi(2) - (x + 0.007).powi(2)).max(0.0).sqrt();

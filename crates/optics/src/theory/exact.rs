@@ -166,7 +166,8 @@ mod tests {
             focus: Focus::At(700.0),
             ..Telescope::table2()
         };
-        let (cn2, range_m) = (Cn2Path::Uniform { cn2_m_m23: 3e-14 }, 1200.0);
+        let cn2 = Cn2Path::Uniform { cn2_m_m23: 3e-14 };
+        let range_m = 1200.0;
         let rho_0 = coherence_radius_m(&cn2, 1.55e-6, range_m).unwrap();
         let closed = square_law_efficiency(&t, rho_0, range_m);
         let exact = efficiency_with(&t, &Misalignment::NONE, range_m, &|rho| {

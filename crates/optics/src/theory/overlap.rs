@@ -286,7 +286,8 @@ mod tests {
         let range_m = 50.0;
         assert!(fresnel_number(&t, range_m) > 300.0);
         let eta = efficiency_with(&t, &Misalignment::NONE, range_m, &|_| 0.0).unwrap();
-        let (a, s) = (0.05f64, 0.03f64);
+        let a = 0.05f64;
+        let s = 0.03f64;
         let squared = (1.0 - (-2.0 * (a / s).powi(2)).exp()) / (2.0 * PI * s * s);
         let shadow = (t.wavelength_m * range_m).powi(2) / (PI * a * a) * squared;
         assert!((eta / shadow - 1.0).abs() < 1e-3, "{eta} {shadow}");

@@ -119,7 +119,8 @@ impl Schedule {
         // When and where the head has done its last line, and the way it then moves.
         let mut last: Option<(f64, Angles, Angles)> = None;
         for (i, stop) in stops.iter().enumerate() {
-            let (from, pulses) = (stop.angles_rad, stop.pulses.unwrap_or(pace.pulses));
+            let from = stop.angles_rad;
+            let pulses = stop.pulses.unwrap_or(pace.pulses);
             let (lines, periods, rate_rad_s) = way(stop, pulses, pace);
             let head_s = last.map_or(0.0, |(_, at, _)| pace.head.time_s(apart_rad(at, from)));
             let tick = match (stop.time_s, last) {
@@ -162,7 +163,9 @@ impl Schedule {
                 let before = (line * pulses) as f64;
                 let angles_rad =
                     std::array::from_fn(|d| from[d] + rate_rad_s[d] * (before * prt_s));
-                let (sweep, first, tick) = (stop.sweep, scan.pulses(), tick + before);
+                let sweep = stop.sweep;
+                let first = scan.pulses();
+                let tick = tick + before;
                 let own = |d: usize| mount.position_m[d] + mount.velocity_m_s[d] * (tick * prt_s);
                 let (position_m, velocity_m_s) = stop
                     .carrier
@@ -187,11 +190,13 @@ impl Schedule {
 
     /// The tick of a time at which the head must be there, `head_s` after the line that ends at the tick `end`; or what is allowed.
     fn in_time(&self, time_s: f64, end: f64, head_s: f64) -> Result<f64, String> {
-        let (tick, earliest) = (time_s / self.prt_s, end + head_s / self.prt_s);
+        let tick = time_s / self.prt_s;
+        let earliest = end + head_s / self.prt_s;
         if tick >= earliest - 1e-6 {
             return Ok(tick);
         }
-        let (end_s, early_s) = (end * self.prt_s, earliest * self.prt_s);
+        let end_s = end * self.prt_s;
+        let early_s = earliest * self.prt_s;
         Err(if time_s < end_s {
             format!("at least {end_s:?} s, the end of the line before")
         } else {
@@ -298,7 +303,8 @@ impl Schedule {
             .lines
             .first()
             .map(|line| (line.pulses, line.angles_rad[0]));
-        let (here_m, still) = (self.mount.position_m, [0.0; 3]);
+        let here_m = self.mount.position_m;
+        let still = [0.0; 3];
         let alike = |line: &Line| {
             Some((line.pulses, line.angles_rad[0])) == first
                 && (line.position_m, line.velocity_m_s) == (here_m, still)

@@ -275,7 +275,8 @@ fn smear_of_uniform_linear_and_vortex_winds_is_that_of_the_tables() {
             motion: wakescope_les::Motion::Frozen,
         };
         let wind = pair.wind().unwrap();
-        let (pulses, prf_hz) = (row("pulses") as usize, 400.0);
+        let pulses = row("pulses") as usize;
+        let prf_hz = 400.0;
         let rate = row("width_rad") / pulses as f64 * prf_hz;
         let angles = [
             [std::f64::consts::FRAC_PI_2, row("elevation_rad")],
@@ -309,7 +310,8 @@ fn each_kind_of_scan_has_its_lines_in_order() {
     );
     let rows = path::raster(1.0, &[0.0, 0.1], [-0.1, 0.1, 0.1], false);
     let ends = |sweep: &[Stop]| (sweep[0].angles_rad[0], sweep[2].angles_rad[0]);
-    let (first, second) = (ends(&rows[0]), ends(&rows[1]));
+    let first = ends(&rows[0]);
+    let second = ends(&rows[1]);
     assert!(
         first.0 < first.1 && second.0 > second.1,
         "{first:?} {second:?}"

@@ -45,7 +45,8 @@ fn presets_are_good_plans_and_all_of_their_flights_differ() {
 #[test]
 fn a_distribution_that_is_appended_moves_no_other() {
     let appended = format!("{TINY}\"flow.core_radius_m\" = {{ uniform = [1.0, 3.0] }}\n");
-    let (before, after) = (plan(TINY).unwrap(), plan(&appended).unwrap());
+    let before = plan(TINY).unwrap();
+    let after = plan(&appended).unwrap();
     for number in [0, 31, 127] {
         let before = before.flight(number).unwrap();
         let after = after.flight(number).unwrap();

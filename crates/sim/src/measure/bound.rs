@@ -111,13 +111,13 @@ impl<'p> Setting<'p> {
 
     /// At a range, with the scene's own signal-to-noise ratios about it.
     fn at(&self, range_m: f64) -> Result<BoundPoint, Error> {
-        let (rays, radius_m) = (&self.of_rays, self.radius.at_m(range_m)?);
-        let (gates_m, most) = (
-            self.places.gate_ranges_m(),
-            self.places.most_gates(radius_m),
-        );
+        let rays = &self.of_rays;
+        let radius_m = self.radius.at_m(range_m)?;
+        let gates_m = self.places.gate_ranges_m();
+        let most = self.places.most_gates(radius_m);
         // Each record is about its innermost window, with which rows of windows begin: ends of the scan cut chords. Most chords share one.
-        let (mut about, mut of_region) = (BTreeMap::new(), 0.0);
+        let mut about = BTreeMap::new();
+        let mut of_region = 0.0;
         for chord in self.places.chords(self.point(range_m), radius_m) {
             let innermost = (chord.first + chord.last) / 2;
             let by_gates = match about.entry(innermost) {
@@ -190,7 +190,8 @@ impl<'p> Setting<'p> {
 /// [`Error::NoBound`] for a scene without noise; what the crates refuse.
 pub fn bound(plan: &Plan, observer: &dyn Observer) -> Result<SceneBound, Error> {
     let scanner = Scanner::new(plan, observer)?;
-    let (setting, gates_m) = (Setting::new(plan, &scanner)?, &plan.geometry.gate_range_m);
+    let setting = Setting::new(plan, &scanner)?;
+    let gates_m = &plan.geometry.gate_range_m;
     let middle_m = gates_m[gates_m.len() / 2];
     let of_snr = |db: i32| setting.of_snr(middle_m, 10f64.powf(0.1 * f64::from(db)));
     let by_snr = SNR_DB.map(of_snr).collect::<Result<_, _>>()?;
@@ -448,8 +449,10 @@ mod tests {
             )
             .unwrap()
         };
-        let (strong, weak) = (at(0.0), at(-20.0));
-        let (row, gate) = (strong.by_snr[10], weak.by_range[weak.by_range.len() / 2]);
+        let strong = at(0.0);
+        let weak = at(-20.0);
+        let row = strong.by_snr[10];
+        let gate = weak.by_range[weak.by_range.len() / 2];
         assert!((row.snr_db + 20.0).abs() < 1e-9 && (gate.snr_db + 20.0).abs() < 1e-9);
         for (row, gate) in [
             (row.n_eff, gate.n_eff),
@@ -478,7 +481,8 @@ mod tests {
             let map = crate::run::run(&scene, &Silent).unwrap().map.unwrap();
             (points, map.n_eff.row(0).to_vec())
         };
-        let (clear, cloudy) = (of("1e-7"), of("1e-4"));
+        let clear = of("1e-7");
+        let cloudy = of("1e-4");
         let at = |range_m: f64| {
             clear
                 .0
@@ -486,7 +490,8 @@ mod tests {
                 .position(|point| point.range_m > range_m)
                 .unwrap()
         };
-        let (far, near) = (at(350.0), at(464.0));
+        let far = at(350.0);
+        let near = at(464.0);
         let ratio = |gate: usize| cloudy.0[gate].region_m_s / clear.0[gate].region_m_s;
         assert!(
             (ratio(far) - 1.0).abs() < 1e-9 && ratio(near) < 0.7,

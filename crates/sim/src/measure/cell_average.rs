@@ -148,7 +148,8 @@ fn about_mean(values: &[f64]) -> Vec<f64> {
 /// have the same square, signed squares, between what Gaussian ones and outliers have; their covariances are between those of
 /// squares and of the values themselves.
 fn of_variance(errors: &[f64]) -> Vec<f64> {
-    let (n, apart) = (errors.len() as f64, about_mean(errors));
+    let n = errors.len() as f64;
+    let apart = about_mean(errors);
     if errors.len() == 2 {
         return apart
             .iter()

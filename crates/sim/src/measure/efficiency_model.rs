@@ -46,10 +46,8 @@ pub(crate) fn stretches<'a>(
 ) -> Vec<([f64; 2], &'a [f64])> {
     let o = &scene.outputs;
     let [first_m, last_m] = [o.profile_range_min_m, o.profile_range_max_m];
-    let (near_m, far_m) = (
-        g.first_layer_range_m,
-        g.first_layer_range_m + g.layers as f64 * g.layer_thickness_m,
-    );
+    let near_m = g.first_layer_range_m;
+    let far_m = g.first_layer_range_m + g.layers as f64 * g.layer_thickness_m;
     let all = match signals_cross_screens(scene) {
         true => {
             vec![

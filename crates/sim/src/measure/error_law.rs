@@ -26,7 +26,8 @@ const OUTLIER: f64 = 6.0;
 /// # Errors
 /// What the crates refuse; a checked scene gives none.
 pub(crate) fn shared_cells(plan: &Plan) -> Result<[f64; 2], Error> {
-    let (scene, g) = (plan.scene(), &plan.geometry);
+    let scene = plan.scene();
+    let g = &plan.geometry;
     let middle_m = g
         .gate_range_m
         .get(g.gate_range_m.len() / 2)
@@ -148,7 +149,8 @@ impl ErrorLaw {
             })
         };
         let bias_m_s = central(1, None) / near_count.mapv(|n| n.max(1.0));
-        let (squares, fourths) = (central(2, Some(&bias_m_s)), central(4, Some(&bias_m_s)));
+        let squares = central(2, Some(&bias_m_s));
+        let fourths = central(4, Some(&bias_m_s));
         let freedoms = near_count.mapv(|n| (n - 1.0).max(0.0));
         let pooled = |reach| sums_about(&squares, reach) / sums_about(&freedoms, reach);
         // The excess of deviations from a mean of few is a part of that of the errors.
@@ -262,7 +264,8 @@ impl ErrorLaw {
     /// that mean; the first over the number of estimates is what they add to the variance of the mean error.
     pub(crate) fn unseen(&self, cells: &[(usize, usize)]) -> ([f64; 2], f64) {
         let sum = |of: &Array2<f64>| cells.iter().map(|cell| of[*cell]).sum::<f64>();
-        let (count, found) = (sum(&self.count), sum(&self.outliers));
+        let count = sum(&self.count);
+        let found = sum(&self.outliers);
         let part = (self.expected(found, count) - found / count).max(0.0);
         let [square, fourth] = self
             .powers
@@ -300,8 +303,10 @@ fn sums_about(values: &Array2<f64>, reach: [usize; 2]) -> Array2<f64> {
         table[(i + 1, j + 1)] = value + table[(i, j + 1)] + table[(i + 1, j)] - table[(i, j)];
     }
     Array2::from_shape_fn((lines, gates), |(i, j)| {
-        let (first, end) = (i.saturating_sub(reach[0]), (i + reach[0] + 1).min(lines));
-        let (left, right) = (j.saturating_sub(reach[1]), (j + reach[1] + 1).min(gates));
+        let first = i.saturating_sub(reach[0]);
+        let end = (i + reach[0] + 1).min(lines);
+        let left = j.saturating_sub(reach[1]);
+        let right = (j + reach[1] + 1).min(gates);
         let sum =
             table[(end, right)] - table[(first, right)] - table[(end, left)] + table[(first, left)];
         sum.max(0.0)

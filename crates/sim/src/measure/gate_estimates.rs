@@ -48,7 +48,8 @@ pub(crate) struct GateSums {
 impl GateSums {
     /// Adds the estimate of a map, held against so many times the scene's noise; returns whether it is flagged.
     pub(crate) fn add(&mut self, gate: &GateEstimate, noise_factor: f64) -> bool {
-        let (is_flagged, e) = (gate.is_flagged(noise_factor), &gate.found.estimate);
+        let is_flagged = gate.is_flagged(noise_factor);
+        let e = &gate.found.estimate;
         (self.level, self.n_eff, self.deviation) =
             (gate.found.level as f64, gate.found.n_eff, gate.deviation);
         self.maps += 1.0;
@@ -164,7 +165,8 @@ mod tests {
 
     #[test]
     fn a_width_is_told_where_the_ratio_is_known_that_says_what_the_floor_adds() {
-        let (strong, weak) = (sums(2.0), sums(1.05));
+        let strong = sums(2.0);
+        let weak = sums(1.05);
         assert!(
             strong.snr_db(1.0, 1.0).abs() < 1e-12
                 && (strong.width_m_s(1.0, 1.0) - 2.0).abs() < 1e-12

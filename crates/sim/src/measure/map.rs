@@ -124,7 +124,8 @@ struct Mapper<'p, S> {
 
 impl<'p, S: Sample> Mapper<'p, S> {
     fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
-        let (scene, g) = (plan.scene(), &plan.geometry);
+        let scene = plan.scene();
+        let g = &plan.geometry;
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let places = places(scene, g)?;
         let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
@@ -159,7 +160,8 @@ impl<'p, S: Sample> Mapper<'p, S> {
         own: Option<&ScanAir>,
     ) -> Result<Array2<f64>, Error> {
         let found = self.estimator.gates(scan, &self.points, &self.noise)?;
-        let (map, shape) = (&mut self.map, self.gates.dim());
+        let map = &mut self.map;
+        let shape = self.gates.dim();
         let own = own.map(|air| truth(plan, air, shape)).transpose()?;
         let own_truth_m_s = own.map(|truth| [truth.v_pulse_m_s, truth.v_gate_m_s]);
         let velocity = Array2::from_shape_fn(shape, |(i, j)| {
@@ -192,10 +194,8 @@ impl<'p, S: Sample> Mapper<'p, S> {
     /// `clipped_fraction` is that of the samples that the converter clipped.
     fn finish(self, plan: &Plan, clipped_fraction: f64) -> Result<VelocityEstimates, Error> {
         let Self { mut map, gates, .. } = self;
-        let (statistics, noise_a2) = (
-            self.errors.statistics(),
-            self.estimator.tools.noise.power_a2,
-        );
+        let statistics = self.errors.statistics();
+        let noise_a2 = self.estimator.tools.noise.power_a2;
         map.level = gates.map(|gate| gate.level);
         map.n_eff = gates.map(|gate| gate.n_eff);
         map.count = gates.map(|gate| gate.count);

@@ -38,8 +38,10 @@ pub(crate) type WindowSums<'a, S> = ScanSums<'a, S, dyn Statistic<S>>;
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn windows_at(plan: &Plan, record_elevation_rad: &[f64]) -> Result<ScanGeometry, Error> {
-    let (scene, samples) = (plan.scene(), plan.geometry.samples);
-    let (sampling, gates) = (scene.sampling()?, scene.gates()?);
+    let scene = plan.scene();
+    let samples = plan.geometry.samples;
+    let sampling = scene.sampling()?;
+    let gates = scene.gates()?;
     Ok(ScanGeometry::new(
         &sampling,
         &gates,
@@ -78,7 +80,8 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         places: ScanGeometry,
         held: Option<Range<usize>>,
     ) -> Result<WindowSums<'_, S>, Error> {
-        let (statistic, gates) = (&*self.tools.statistic, self.plan.scene().gates()?);
+        let statistic = &*self.tools.statistic;
+        let gates = self.plan.scene().gates()?;
         Ok(match held {
             None => ScanSums::new(statistic, &gates, places, self.plan.geometry.samples)?,
             Some(held) => ScanSums::of_gates(statistic, &gates, places, held)?,
@@ -177,10 +180,8 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
 
     /// Densities, A^2, that noise exceeds with the rate of false alarms; NaN where there is no window.
     fn thresholds(&self, test: &NoiseTest, regions: &[RegionNoise]) -> Result<Vec<f64>, Error> {
-        let (density_a2, rate) = (
-            self.tools.noise.density_a2,
-            self.plan.scene().estimator.false_alarm,
-        );
+        let density_a2 = self.tools.noise.density_a2;
+        let rate = self.plan.scene().estimator.false_alarm;
         // Many points share their windows.
         let mut known = HashMap::new();
         let of = |region: &RegionNoise| {

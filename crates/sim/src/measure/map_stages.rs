@@ -243,7 +243,8 @@ mod tests {
                 .unwrap_or_else(|| panic!("{step} {radius_m}: {:?}", planned.warnings));
             let empty: usize = text.split(' ').next().unwrap().parse().unwrap();
             // by the distances themselves
-            let (g, scene) = (&planned.geometry, planned.scene());
+            let g = &planned.geometry;
+            let scene = planned.scene();
             let places: ScanGeometry = region::places(scene, g).unwrap();
             let windows_m = places.gate_ranges_m();
             let near = |gate_m: &f64| {

@@ -44,7 +44,8 @@ pub(crate) fn cross_plane(plan: &Plan) -> Result<CrossPlanes, Error> {
     let top_rad = scene.scan.elevation_max_rad.max(0.0);
     let bottom_rad = scene.scan.elevation_min_rad.abs().max(top_rad.abs());
     let far_m = scene.scan.range_max_m;
-    let (low_y_m, high_y_m) = (scene.scan.range_min_m * bottom_rad.cos(), far_m);
+    let low_y_m = scene.scan.range_min_m * bottom_rad.cos();
+    let high_y_m = far_m;
     let top_m = (scene.scan.lidar_height_m + far_m * top_rad.sin()).max(0.1 * far_m);
     let y_m = linspace(low_y_m, high_y_m, POINTS[0]);
     let z_m = linspace(0.0, top_m, POINTS[1]);

@@ -182,9 +182,11 @@ impl LineOptics<'_> {
     /// What the optics refuse, such as a grid too small for the beam; in turbulence that phase screens cross, ranges beyond the signals and
     /// the profile of the scene.
     pub(crate) fn profile_at(&self, range_m: &[f64]) -> Result<RangeProfile, Error> {
-        let (scene, instrument) = (self.plan.scene(), self.instrument);
+        let scene = self.plan.scene();
+        let instrument = self.instrument;
         let theory = efficiency_by_theory(instrument, range_m)?;
-        let (mut others, mut lost_power_fraction) = (Vec::new(), None);
+        let mut others = Vec::new();
+        let mut lost_power_fraction = None;
         let mut efficiency = theory.clone();
         if scene.refractive_turbulence().is_some() {
             let ([monostatic, bistatic], lost) = self.across_screens(&theory)?;
@@ -249,7 +251,9 @@ impl LineOptics<'_> {
         &self,
         theory: &EfficiencyProfile,
     ) -> Result<([EfficiencyProfile; 2], f64), Error> {
-        let (mut found, mut done, mut lost) = ([const { Vec::new() }; 6], 0, 0f64);
+        let mut found = [const { Vec::new() }; 6];
+        let mut done = 0;
+        let mut lost = 0f64;
         for (ends_m, inside) in stretches(self.plan.scene(), &self.plan.geometry, &theory.range_m) {
             let screens = self.screens(ends_m)?;
             lost = lost.max(screens.lost_power_fraction);
@@ -265,7 +269,8 @@ impl LineOptics<'_> {
         }
         if let Some(&range_m) = theory.range_m.get(done) {
             let o = &self.plan.scene().outputs;
-            let (first_m, last_m) = (o.profile_range_min_m, o.profile_range_max_m);
+            let first_m = o.profile_range_min_m;
+            let last_m = o.profile_range_max_m;
             return Err(wakescope_optics::Error::Extrapolation {
                 range_m,
                 first_m,
@@ -287,7 +292,8 @@ impl LineOptics<'_> {
     /// What a curve depends on: on the seed only in turbulence, where screens may be drawn.
     fn cause(&self, range_m: &[f64]) -> String {
         let scene = self.plan.scene();
-        let (air, laser) = (&scene.atmosphere.turbulence, scene.laser.wavelength_m);
+        let air = &scene.atmosphere.turbulence;
+        let laser = scene.laser.wavelength_m;
         let seed = scene.refractive_turbulence().map(|_| scene.seed);
         let cn2 = self.instrument.turbulence.as_ref().map(|t| &t.cn2);
         hash_of(&format!(
@@ -301,7 +307,9 @@ impl LineOptics<'_> {
     /// # Errors
     /// What the optics refuse, such as a grid too small for the beam.
     fn run_screens(&self, range_m: Vec<f64>) -> Result<Screens, Error> {
-        let (scene, instrument, observer) = (self.plan.scene(), self.instrument, self.observer);
+        let scene = self.plan.scene();
+        let instrument = self.instrument;
+        let observer = self.observer;
         let t = scene.refractive_turbulence().unwrap_or_default();
         observer.begin(Stage::PhaseScreens, t.realisations as u64);
         let mut seen = 0;
@@ -370,7 +378,8 @@ impl LineOptics<'_> {
 
 /// Mean signal-to-noise ratio (14) in the detector band at the ranges of an efficiency, dB, or what the scene fixes.
 pub(crate) fn snr_db(plan: &Plan, efficiency: &EfficiencyProfile) -> Result<Vec<f64>, Error> {
-    let (scene, instrument) = (plan.scene(), &plan.instrument);
+    let scene = plan.scene();
+    let instrument = &plan.instrument;
     let snr_db = |(&range_m, &mean): (&f64, &f64)| match scene.detector.snr {
         SnrReference::Fixed { snr_db } => Ok(snr_db),
         _ => {
@@ -485,7 +494,8 @@ mod tests {
     /// (14) as it is written, for a return that changes slowly over the pulse, in even air.
     fn of_14(plan: &Plan, range_m: f64, efficiency: f64) -> f64 {
         const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
-        let (scene, air) = (plan.scene(), &plan.scene().atmosphere);
+        let scene = plan.scene();
+        let air = &plan.scene().atmosphere;
         let photon_j = 6.626_070_15e-34 * SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m;
         let photons = scene.detector.quantum_efficiency * scene.pulse.energy_j / photon_j;
         let area_m2 = std::f64::consts::PI * scene.telescope.aperture_radius_m.powi(2);
@@ -598,7 +608,8 @@ mod tests {
         let more = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-13\ngrid_points = 160\n\
              grid_spacing_m = 0.0022\nlayers = 5\nrealisations = 8\n[outputs]\nprofile_range_max_m = 560.0\n";
         let plan = plan("focus_m = 300.0", [200.0, 500.0], more, Target::Map);
-        let (scene, instrument) = (plan.scene(), &plan.instrument);
+        let scene = plan.scene();
+        let instrument = &plan.instrument;
         let (ends_m, _) = stretches(scene, &plan.geometry, &[300.0])[0];
         let nodes_m = curved_ranges_m(&instrument.telescope, ends_m[0], ends_m[1], OF_SCREENS);
         let between_m: Vec<f64> = nodes_m.windows(2).map(|r| 0.5 * (r[0] + r[1])).collect();

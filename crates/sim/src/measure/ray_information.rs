@@ -42,7 +42,9 @@ impl<'a> RayInformation<'a> {
     /// # Errors
     /// What the crates refuse; a checked scene gives none.
     pub(crate) fn new(plan: &'a Plan, layer_snr: &[(f64, f64)]) -> Result<Self, Error> {
-        let (scene, g, pulse) = (plan.scene(), &plan.geometry, &plan.instrument.pulse);
+        let scene = plan.scene();
+        let g = &plan.geometry;
+        let pulse = &plan.instrument.pulse;
         let (layer_m, layer_snr) = layer_snr.iter().copied().unzip();
         let model = estimators::record_model(scene, pulse)?;
         let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
@@ -66,13 +68,15 @@ impl<'a> RayInformation<'a> {
 
     /// Information on the velocity, 1/(m/s)^2, in 1, 2, .. `count` windows about a range, each sample having the ratio that it sees.
     pub(crate) fn at(&self, range_m: f64, count: usize) -> Result<Vec<f64>, Error> {
-        let (scene, g) = (self.plan.scene(), &self.plan.geometry);
+        let scene = self.plan.scene();
+        let g = &self.plan.geometry;
         if scene.detector.noise == NoiseModel::None {
             return self.of_snr(*SNR.end(), count);
         }
         let snr = |samples: f64| {
             // The samples of a window are centred half a sample before its range; the pulse lights layers before and behind each.
-            let (at_m, mut snr) = (range_m + (samples - 0.5) * g.sample_spacing_m, [0.0]);
+            let at_m = range_m + (samples - 0.5) * g.sample_spacing_m;
+            let mut snr = [0.0];
             let seen =
                 self.by_pulse
                     .apply_into(self.layer_m[0], &self.layer_snr, &[at_m], &mut snr);
@@ -106,7 +110,8 @@ mod tests {
         )
         .unwrap();
         // By e in 20 m, as behind a focus: exp(v/(2 * 20^2)) more through a pulse of the variance v.
-        let (fall_m, thickness_m) = (20.0, plan.geometry.layer_thickness_m);
+        let fall_m = 20.0;
+        let thickness_m = plan.geometry.layer_thickness_m;
         let of_air = |range_m: f64| 3.0 * (-(range_m - 400.0) / fall_m).exp();
         let layers: Vec<(f64, f64)> = (0..4000)
             .map(|i| 200.0 + f64::from(i) * thickness_m)
@@ -119,7 +124,8 @@ mod tests {
         let variance_m2 = 0.5 * plan.instrument.pulse.sigma_m().powi(2);
         let spacing_m = 0.5 * SPEED_OF_LIGHT_M_S / 250e6;
         for (found, range_m) in found.into_iter().zip([350.0, 401.3]) {
-            let (mut sum, mut total) = (0.0, 0.0);
+            let mut sum = 0.0;
+            let mut total = 0.0;
             for n in 0..48 {
                 let h2 = (std::f64::consts::PI * (f64::from(n) - 23.5) / 48.0)
                     .cos()

@@ -14,7 +14,9 @@ use wakescope_estimate::{Radius, map::ScanGeometry};
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn places(scene: &Scene, g: &Geometry) -> Result<ScanGeometry, Error> {
-    let (sampling, gates, scan) = (scene.sampling()?, scene.gates()?, &g.schedule);
+    let sampling = scene.sampling()?;
+    let gates = scene.gates()?;
+    let scan = &g.schedule;
     if scan.is_plane() {
         let pulses = scan.lines.first().map_or(1, |line| line.pulses);
         return Ok(ScanGeometry::regular(
@@ -95,7 +97,8 @@ mod tests {
 
     #[test]
     fn tables_are_linear_between_their_points() {
-        let (x, y) = ([1.0, 2.0, 4.0], [10.0, 20.0, 0.0]);
+        let x = [1.0, 2.0, 4.0];
+        let y = [10.0, 20.0, 0.0];
         for (at, expected) in [
             (0.0, 10.0),
             (1.0, 10.0),

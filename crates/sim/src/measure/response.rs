@@ -43,7 +43,8 @@ impl SceneResponse {
     /// # Errors
     /// What the regions refuse; a checked scene gives none.
     pub(crate) fn new(plan: &Plan, layer_snr: Vec<(f64, f64)>) -> Result<Option<Self>, Error> {
-        let (scene, pulse) = (plan.scene(), &plan.instrument.pulse);
+        let scene = plan.scene();
+        let pulse = &plan.instrument.pulse;
         let Some(noise) = scene.noise_spectrum().filter(|_| scene.pulse.is_gaussian()) else {
             return Ok(None);
         };

@@ -134,7 +134,9 @@ impl<'a> Scanner<'a> {
         known: &EfficiencyMemo,
         observer: &dyn Observer,
     ) -> Result<Self, Error> {
-        let (scene, instrument, geometry) = (plan.scene(), &plan.instrument, &plan.geometry);
+        let scene = plan.scene();
+        let instrument = &plan.instrument;
+        let geometry = &plan.geometry;
         let optics = LineOptics {
             plan,
             instrument,
@@ -391,7 +393,9 @@ fn returns_of_slants(optics: &LineOptics<'_>) -> Result<Vec<Vec<f64>>, Error> {
 /// states takes the place of all of it.
 fn layer_returns(optics: &LineOptics<'_>) -> Result<Vec<f64>, Error> {
     let plan = optics.plan;
-    let (scene, instrument, geometry) = (plan.scene(), optics.instrument, &plan.geometry);
+    let scene = plan.scene();
+    let instrument = optics.instrument;
+    let geometry = &plan.geometry;
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         let unit = instrument
             .receiver
@@ -413,7 +417,8 @@ fn previous_air(
     wind: &SceneWind,
     lines: &[LineOfSight],
 ) -> Result<Option<Vec<LineOfSight>>, Error> {
-    let (scene, geometry) = (plan.scene(), &plan.geometry);
+    let scene = plan.scene();
+    let geometry = &plan.geometry;
     let Some(SecondTrip {
         radial_velocity_m_s: elsewhere_m_s,
     }) = scene.scan.second_trip
@@ -461,7 +466,8 @@ fn drawn_efficiency(
     optics: &LineOptics<'_>,
     lines: &[LineOfSight],
 ) -> Result<Option<Vec<LayerEfficiency>>, Error> {
-    let (scene, geometry) = (optics.plan.scene(), &optics.plan.geometry);
+    let scene = optics.plan.scene();
+    let geometry = &optics.plan.geometry;
     let (Some(_), Some(line)) = (drawn_turbulence(scene), lines.first()) else {
         return Ok(None);
     };

@@ -6,7 +6,8 @@ use crate::scene::{DetectorSignal, Scene};
 /// Least and largest velocity that the samples of a scene can tell from others, m/s: real currents are mirrored at 0 and at half the
 /// sampling frequency, complex ones repeat.
 pub(crate) fn sampled_velocities_m_s(scene: &Scene) -> (f64, f64) {
-    let (d, half_m) = (&scene.detector, 0.5 * scene.laser.wavelength_m);
+    let d = &scene.detector;
+    let half_m = 0.5 * scene.laser.wavelength_m;
     let half_hz = 0.5 * d.sampling_hz;
     match d.signal {
         DetectorSignal::IntermediateFrequency => (

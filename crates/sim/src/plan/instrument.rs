@@ -35,7 +35,8 @@ impl Instrument {
     /// # Errors
     /// What optics or signals refuse, such as samples that are no pulse.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
-        let (telescope, receiver) = (telescope(scene).validated()?, receiver(scene));
+        let telescope = telescope(scene).validated()?;
+        let receiver = receiver(scene);
         let digitiser = match scene.detector.digitiser {
             Digitiser::None {} => None,
             Digitiser::Quantised {
@@ -191,10 +192,8 @@ pub fn receiver(scene: &Scene) -> signal::Receiver {
 
 /// What the receiver of a scene has beyond shot noise.
 fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
-    let (d, words) = (
-        &scene.detector,
-        scene.detector.front_end.unwrap_or_default(),
-    );
+    let d = &scene.detector;
+    let words = scene.detector.front_end.unwrap_or_default();
     let converter = match d.digitiser {
         Digitiser::None {} => None,
         Digitiser::Quantised {

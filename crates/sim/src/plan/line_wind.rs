@@ -55,7 +55,8 @@ pub(crate) fn wind_of_line(
     }
     let mut sums_m_s = vec![0.0; range_m.len()];
     let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
-    let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
+    let mut first_m_s = Vec::new();
+    let mut first_seen_m_s = Vec::new();
     let share = 1.0 / pulses as f64;
     for pulse in 0..pulses {
         let here = wind_along(plan, wind, &schedule.beam(line, pulse as f64), range_m)?;

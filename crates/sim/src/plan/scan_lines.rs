@@ -17,7 +17,8 @@ use std::path::PathBuf;
 /// A list that cannot be read or followed; beams that meet the ground where the scene does not allow it.
 pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
     let scene = &file.content;
-    let (s, head) = (&scene.scan, &scene.scan.head);
+    let s = &scene.scan;
+    let head = &scene.scan.head;
     let pace = Pace {
         prt_s: 1.0 / scene.laser.pulse_repetition_hz,
         pulses: s.pulses_per_line,
@@ -49,7 +50,8 @@ pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
 
 /// North, and where the lidar is.
 fn mount(scene: &Scene) -> Mount {
-    let (s, l) = (&scene.scan, &scene.scan.lidar);
+    let s = &scene.scan;
+    let l = &scene.scan.lidar;
     let reference_rad = match (l.flight_azimuth_rad, &s.pattern) {
         (Some(azimuth_rad), _) => (azimuth_rad, 0.0),
         // The plane of a scan across the flight, whatever it is called.

@@ -32,8 +32,10 @@ pub struct ScanSchedule {
 impl Plan {
     /// The schedule of the scan.
     pub fn schedule(&self) -> ScanSchedule {
-        let (scene, scan) = (self.scene(), &self.geometry.schedule);
-        let (duration_s, revisit_s) = (scan.duration_s(), scan.revisit_s().unwrap_or(f64::NAN));
+        let scene = self.scene();
+        let scan = &self.geometry.schedule;
+        let duration_s = scan.duration_s();
+        let revisit_s = scan.revisit_s().unwrap_or(f64::NAN);
         let meanwhile_s = if revisit_s.is_nan() {
             duration_s
         } else {
@@ -67,7 +69,8 @@ impl Plan {
 impl std::fmt::Display for ScanSchedule {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let many = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
-        let (lines, sweeps) = (many(self.lines, "line"), many(self.sweeps, "sweep"));
+        let lines = many(self.lines, "line");
+        let sweeps = many(self.sweeps, "sweep");
         write!(
             f,
             "{}: {lines} in {sweeps}, {} in {:.2} s",
@@ -86,7 +89,8 @@ impl std::fmt::Display for ScanSchedule {
             )?;
         }
         if self.smear_rad > 0.0 {
-            let (mrad, smear_m) = (1e3 * self.smear_rad, self.smear_m);
+            let mrad = 1e3 * self.smear_rad;
+            let smear_m = self.smear_m;
             write!(
                 f,
                 "; each line turns by {mrad:.2} mrad, {smear_m:.1} m at scan.range_max_m"

@@ -44,7 +44,8 @@ pub(super) fn of_scene(plan: &Plan) -> Result<Vec<String>, Error> {
     if let Some(pair) = &plan.wind.pair {
         out.extend(pair.warnings(plan.oldest_age_s()));
     }
-    let (first_m, blind_m) = (scene.scan.range_min_m, scene.telescope.blind_range_m);
+    let first_m = scene.scan.range_min_m;
+    let blind_m = scene.telescope.blind_range_m;
     if first_m < blind_m {
         out.push(format!("scan.range_min_m = {first_m}: nothing is seen up to telescope.blind_range_m, {blind_m} m"));
     }

@@ -203,7 +203,8 @@ mod tests {
         .medium(1.55e-6)
         .unwrap();
         for range_m in [1e4, 3e7, 1.5e11] {
-            let (found, expected) = (air.transmission(range_m).unwrap(), (-1e-9 * range_m).exp());
+            let found = air.transmission(range_m).unwrap();
+            let expected = (-1e-9 * range_m).exp();
             assert!(
                 (found - expected).abs() <= 1e-9 * expected,
                 "{range_m} m: {found} {expected}"

@@ -116,7 +116,8 @@ impl Scene {
             "below",
         );
         if let Some(p) = self.flow.pair() {
-            let (core_m, spacing_m) = (p.core_radius_m, p.spacing_m);
+            let core_m = p.core_radius_m;
+            let spacing_m = p.spacing_m;
             let below = format!("below half of flow.spacing_m, {} m", 0.5 * spacing_m);
             let above = format!("above twice flow.core_radius_m, {} m", 2.0 * core_m);
             let sides = [
@@ -146,11 +147,9 @@ impl Scene {
     /// The detector band lies between 0 and half the sampling frequency; that of two quadratures, which are made of it, within the whole one.
     fn check_band(&self, c: &mut Checker<'_>) {
         let d = &self.detector;
-        let (centre_hz, half_hz, nyquist_hz) = (
-            d.intermediate_frequency_hz,
-            0.5 * d.bandwidth_hz,
-            0.5 * d.sampling_hz,
-        );
+        let centre_hz = d.intermediate_frequency_hz;
+        let half_hz = 0.5 * d.bandwidth_hz;
+        let nyquist_hz = 0.5 * d.sampling_hz;
         let is_baseband = d.signal == DetectorSignal::Baseband;
         // Two quadratures hold the band about 0, whose upper end then bounds no frequency.
         let (sampled_hz, highest_hz) = if is_baseband {
@@ -195,7 +194,8 @@ impl Scene {
 
     /// The spectrum has a frequency in the band.
     fn check_frequencies(&self, c: &mut Checker<'_>) {
-        let (d, e) = (&self.detector, &self.estimator);
+        let d = &self.detector;
+        let e = &self.estimator;
         let method = e.method.behaviour();
         let (key, factor) = method.frequencies_key();
         let value = method.frequencies(e) / factor;
@@ -219,7 +219,8 @@ impl Scene {
 
     fn check_lines(&self, c: &mut Checker<'_>) {
         let s = &self.scan;
-        let (low_rad, high_rad) = (s.elevation_min_rad, s.elevation_max_rad);
+        let low_rad = s.elevation_min_rad;
+        let high_rad = s.elevation_max_rad;
         c.compare(
             ["scan.elevation_max_rad", "scan.elevation_min_rad"],
             [high_rad, low_rad],
@@ -238,7 +239,8 @@ impl Scene {
     }
 
     fn check_ranges(&self, c: &mut Checker<'_>) {
-        let (first_m, last_m) = (self.scan.range_min_m, self.scan.range_max_m);
+        let first_m = self.scan.range_min_m;
+        let last_m = self.scan.range_max_m;
         // Scatterers that a sample sees reach back by the length of the summation of (15), to the last time of the pulse.
         let last_s = self
             .pulse
@@ -278,9 +280,11 @@ impl Scene {
 
     /// The record has samples for a window, and not too many of them.
     fn check_record(&self, c: &mut Checker<'_>) {
-        let (first_m, last_m) = (self.scan.range_min_m, self.scan.range_max_m);
+        let first_m = self.scan.range_min_m;
+        let last_m = self.scan.range_max_m;
         let sampling_hz = self.detector.sampling_hz;
-        let (samples, spacing_m) = (self.samples_per_record(), self.sample_spacing_m());
+        let samples = self.samples_per_record();
+        let spacing_m = self.sample_spacing_m();
         let many = format!("records of at most 10000000 samples; this one has {samples}");
         let values = [
             ("scan.range_max_m", last_m),
@@ -297,10 +301,8 @@ impl Scene {
             "so that the record, {samples} samples, holds estimator.window_samples, {window}"
         );
         // Rounded to the side that is accepted.
-        let (up_m, down_m) = (
-            ((first_m + window_m) * 1e3).ceil() / 1e3,
-            ((last_m - window_m) * 1e3).floor() / 1e3,
-        );
+        let up_m = ((first_m + window_m) * 1e3).ceil() / 1e3;
+        let down_m = ((last_m - window_m) * 1e3).floor() / 1e3;
         let all = format!(
             "at most {samples}, the samples recorded from scan.range_min_m to scan.range_max_m"
         );
@@ -328,20 +330,16 @@ impl Scene {
 
     /// A HALO raw file counts gates from the lidar and knows their length alone.
     pub(super) fn check_hpl(&self, c: &mut Checker<'_>) {
-        let (window, step) = (
-            self.estimator.window_samples,
-            self.estimator.gate_step_samples,
-        );
+        let window = self.estimator.window_samples;
+        let step = self.estimator.gate_step_samples;
         let allowed = format!(
             "only with gates that touch and do not overlap: estimator.gate_step_samples = {window}, as estimator.window_samples, not {step}"
         );
         if !c.require(step == window, "outputs.hpl", true, allowed) {
             return;
         }
-        let (first_m, gate_m) = (
-            self.scan.range_min_m,
-            window as f64 * self.sample_spacing_m(),
-        );
+        let first_m = self.scan.range_min_m;
+        let gate_m = window as f64 * self.sample_spacing_m();
         let near_m = |number: f64| (number * gate_m * 1e4).round() / 1e4;
         let before = (first_m / gate_m).floor();
         let allowed = format!(

@@ -242,10 +242,8 @@ mod tests {
             keys.sort();
             keys
         };
-        let (written, all) = (
-            flat(TABLE2_TOML),
-            flat(&to_table(&Scene::default()).to_string()),
-        );
+        let written = flat(TABLE2_TOML);
+        let all = flat(&to_table(&Scene::default()).to_string());
         for key in &written {
             assert!(all.contains(key), "{key} is no key");
         }

@@ -263,10 +263,8 @@ impl Scene {
             }
         }
         let moves = s.head.motion == HeadMotion::Continuous;
-        let (up_rad, across_rad) = (
-            s.elevation_max_rad - s.elevation_min_rad,
-            azimuths.map_or(0.0, |(a, b, _)| b - a),
-        );
+        let up_rad = s.elevation_max_rad - s.elevation_min_rad;
+        let across_rad = azimuths.map_or(0.0, |(a, b, _)| b - a);
         let across = "scan.pattern.azimuth_step_rad";
         let (turn_rad, step_rad, rows, key) = match &s.pattern {
             Pattern::Rhi {} => (up_rad, s.elevation_step_rad, 1.0, "scan.elevation_step_rad"),
@@ -323,7 +321,8 @@ impl Scene {
         };
         let few = c.between(all <= MOST_LINES, &sides);
         // Pulses, and the way of the head from line to line.
-        let (prf_hz, dead_time_s) = (self.laser.pulse_repetition_hz, s.head.dead_time_s);
+        let prf_hz = self.laser.pulse_repetition_hz;
+        let dead_time_s = s.head.dead_time_s;
         let turns_s = if step_rad == 1.0 {
             0.0
         } else {

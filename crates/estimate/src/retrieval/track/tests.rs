@@ -170,7 +170,10 @@ fn scan(k: usize, wake: &Wake, rng: &mut Xoshiro256PlusPlus) -> ScanResult {
 #[test]
 fn smoothed_circulations_are_twice_as_good_as_those_of_a_scan_and_bands_tell_it() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
-    let (mut squares, mut normalised, mut innovation, repeats) = (0.0, 0.0, 0.0, 60);
+    let mut squares = 0.0;
+    let mut normalised = 0.0;
+    let mut innovation = 0.0;
+    let repeats = 60;
     for _ in 0..repeats {
         let (results, truth) = series(8, &mut rng);
         let found = tracked_with(&results, 0.002).unwrap();

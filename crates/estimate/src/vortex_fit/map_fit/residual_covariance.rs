@@ -579,7 +579,9 @@ mod tests {
     /// Moving sums of 4 x 3 independent numbers: the variance of a sum of all cells is that of the numbers below.
     #[test]
     fn sums_of_correlated_residuals_have_their_variance() {
-        let (lines, gates, repeats) = (60, 40, 40);
+        let lines = 60;
+        let gates = 40;
+        let repeats = 40;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let cells = cells(lines, gates, |_, _| true);
         // a wave over the map
@@ -587,7 +589,8 @@ mod tests {
             .iter()
             .map(|cell| (0.2 * cell.line as f64).sin() * (0.25 * cell.gate as f64).cos())
             .collect();
-        let (mut stated, mut squares) = (0.0, 0.0);
+        let mut stated = 0.0;
+        let mut squares = 0.0;
         for _ in 0..repeats {
             let white = Array2::from_shape_fn((lines + 3, gates + 2), |_| normal(&mut rng));
             let moving = |cell: &Cell| {
@@ -613,7 +616,8 @@ mod tests {
     /// Every pair of cells written out, with holes.
     #[test]
     fn pairs_about_holes_are_those_of_the_sum_written_out() {
-        let (lines, gates) = (9, 7);
+        let lines = 9;
+        let gates = 7;
         let cells = cells(lines, gates, |line, gate| line * gate % 5 != 3);
         let of = |number: fn(f64) -> f64| -> Vec<f64> {
             cells
@@ -621,10 +625,8 @@ mod tests {
                 .map(|cell| number((cell.line * gates + cell.gate) as f64))
                 .collect()
         };
-        let (residuals, slopes) = (
-            of(|x| (x * x).sin() + 1.0),
-            [of(|x| (1.3 * x).cos()), of(f64::sin)],
-        );
+        let residuals = of(|x| (x * x).sin() + 1.0);
+        let slopes = [of(|x| (1.3 * x).cos()), of(f64::sin)];
         let plane = Plane::new(&cells);
         let correlation = neighbours(&plane, &residuals, 3).unwrap();
         let at = |a: &Cell, b: &Cell| {
@@ -675,7 +677,9 @@ mod tests {
     #[test]
     fn sums_of_white_and_correlated_noise_have_their_variance_although_the_fit_takes_from_the_residuals()
      {
-        let (lines, gates, repeats) = (40, 24, 24);
+        let lines = 40;
+        let gates = 24;
+        let repeats = 24;
         let cells = cells(lines, gates, |line, gate| (7 * line + gate) % 23 != 0);
         let wave = |a: f64, b: f64| -> Vec<f64> {
             cells
@@ -687,7 +691,8 @@ mod tests {
         let basis = orthonormal(&slopes);
         for (smooth, white) in [(0, 1.0), (9, 0.3)] {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-            let (mut stated, mut found) = (0.0, 0.0);
+            let mut stated = 0.0;
+            let mut found = 0.0;
             for _ in 0..repeats {
                 // moving means of white numbers: correlated over about `smooth` lines and half as many gates
                 let room = smooth + 1;

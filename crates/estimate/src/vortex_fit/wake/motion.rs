@@ -125,10 +125,8 @@ mod tests {
 
     #[test]
     fn derivatives_carried_back_are_difference_quotients() {
-        let (model, wake) = (
-            WakeModel::default(),
-            Wake::from_array(&[420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.0, 3.0, 0.02]),
-        );
+        let model = WakeModel::default();
+        let wake = Wake::from_array(&[420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.0, 3.0, 0.02]);
         let seen = |wake: &Wake| {
             let moved = Motion::new(&model, wake).wake_after(wake, 2.5);
             model.radial_velocity_m_s(&moved, 400.0, 0.12)

@@ -295,7 +295,9 @@ mod tests {
 
     #[test]
     fn derivatives_of_gate_velocities_are_difference_quotients() {
-        let (model, kernel, ray) = (WakeModel::default(), gate(), Ray::new(0.12));
+        let model = WakeModel::default();
+        let kernel = gate();
+        let ray = Ray::new(0.12);
         let ranges = [377.7, 400.0];
         let values = |wake: &Wake| {
             let mut values = vec![];
@@ -333,7 +335,8 @@ mod tests {
         let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1]);
         let lopsided = RangeKernel::new(-10.0, 4.0, &[0.1, 0.4, 0.3, 0.15, 0.05]).unwrap();
         let seen = |kernel: &RangeKernel| {
-            let (mut seen, ray) = (Vec::new(), Ray::new(0.3));
+            let mut seen = Vec::new();
+            let ray = Ray::new(0.3);
             let take = |_, v, _: &[f64; PARAMETERS]| seen.push(v);
             kernel.apply(
                 (&WakeModel::default(), &calm, ray),

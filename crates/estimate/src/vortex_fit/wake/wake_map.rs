@@ -89,10 +89,8 @@ mod tests {
     #[test]
     fn a_region_of_no_radius_gives_the_velocities_of_the_kernel() {
         let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02]);
-        let (model, point) = (
-            WakeModel::default(),
-            RangeKernel::new(0.0, 1.0, &[1.0]).unwrap(),
-        );
+        let model = WakeModel::default();
+        let point = RangeKernel::new(0.0, 1.0, &[1.0]).unwrap();
         let map = model
             .map(&wake, &point, &ELEVATIONS_RAD, &RANGES_M, 0.0)
             .unwrap();
@@ -112,10 +110,8 @@ mod tests {
             },
             ..calm
         };
-        let (model, point) = (
-            WakeModel::default(),
-            RangeKernel::new(0.0, 1.0, &[1.0]).unwrap(),
-        );
+        let model = WakeModel::default();
+        let point = RangeKernel::new(0.0, 1.0, &[1.0]).unwrap();
         let map = |wake, radius_m| {
             model
                 .map(wake, &point, &ELEVATIONS_RAD, &RANGES_M, radius_m)
@@ -124,7 +120,8 @@ mod tests {
         let change = map(&calm, 2.0) - map(&calm, 0.0);
         assert!(change.row(4).iter().all(|v| v.abs() < 1e-3), "{change}");
         // 2 m above the centre, where the air is fastest, it is averaged with slower air
-        let (sharp, blurred) = (map(&wake, 0.0)[[6, 0]], map(&wake, 2.0)[[6, 0]]);
+        let sharp = map(&wake, 0.0)[[6, 0]];
+        let blurred = map(&wake, 2.0)[[6, 0]];
         assert!(
             blurred.abs() < 0.98 * sharp.abs() && blurred.abs() > 0.5 * sharp.abs(),
             "{blurred} {sharp}"
@@ -134,10 +131,8 @@ mod tests {
     #[test]
     fn impossible_wakes_and_radii_are_refused() {
         let wake = Wake::from_array(&[500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.0, 2.0, 0.0, 0.0]);
-        let (model, point) = (
-            WakeModel::default(),
-            RangeKernel::new(0.0, 1.0, &[1.0]).unwrap(),
-        );
+        let model = WakeModel::default();
+        let point = RangeKernel::new(0.0, 1.0, &[1.0]).unwrap();
         assert!(
             model
                 .map(&wake, &point, &ELEVATIONS_RAD, &RANGES_M, -1.0)

@@ -29,7 +29,8 @@ fn vortices(
         for &(gamma, y0, z0, core) in list {
             for copy in -2..=2 {
                 for (z0, sign) in [(z0, 1.0), (-z0, -1.0)] {
-                    let (dy, dz) = (y - y0 - bend(x) - 4.0 * f64::from(copy), z - z0);
+                    let dy = y - y0 - bend(x) - 4.0 * f64::from(copy);
+                    let dz = z - z0;
                     let r2 = dy * dy + dz * dz;
                     let rotation_per_s =
                         sign * gamma / TAU * (1.0 - (-r2 / (core * core)).exp()) / r2.max(1e-12);

@@ -424,11 +424,9 @@ mod tests {
         };
         let flow = start(48, 0.01, field);
         let found = flow.own_vorticity_magnitude_per_s().unwrap();
-        let (x_m, y_m, z_m) = (
-            flow.mesh().centre_m(0),
-            flow.mesh().centre_m(1),
-            flow.mesh().centre_m(2),
-        );
+        let x_m = flow.mesh().centre_m(0);
+        let y_m = flow.mesh().centre_m(1);
+        let z_m = flow.mesh().centre_m(2);
         let largest = 3.0 * PI;
         for (place, found) in found.iter().enumerate() {
             let expected = magnitude([x_m[place % 48], y_m[place / 48 % 48], z_m[place / 48 / 48]]);
@@ -470,7 +468,8 @@ mod tests {
         let mut row = [0.0];
         for (j, k) in [(3, 5), (17, 30), (8, 16)] {
             curl.row(&velocity, 0, j, k, &mut row);
-            let (y, z) = (flow.mesh().face_m(1)[j], flow.mesh().face_m(2)[k]);
+            let y = flow.mesh().face_m(1)[j];
+            let z = flow.mesh().face_m(2)[k];
             let expected = TAU * (PI * y).sin() * (PI * z).sin();
             assert!(
                 (row[0] - expected).abs() < 2e-4 * TAU,

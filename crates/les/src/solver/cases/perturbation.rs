@@ -252,7 +252,8 @@ mod tests {
     fn divergence(field: &Perturbation, length: f64, at: [f64; 3]) -> f64 {
         let h = 1e-5;
         let slope = |d: usize| {
-            let (mut a, mut b) = (at, at);
+            let mut a = at;
+            let mut b = at;
             a[d] += h;
             b[d] -= h;
             (velocity(field, length, a)[d] - velocity(field, length, b)[d]) / (2.0 * h)
@@ -276,10 +277,8 @@ mod tests {
             let ground = velocity(field, 2.0, [0.3, 0.2, 0.0]);
             assert!(ground.iter().all(|v| v.abs() < 1e-15), "{ground:?}");
         }
-        let (left, right) = (
-            velocity(&background, 2.0, [0.4, -2.0, 1.1]),
-            velocity(&background, 2.0, [0.4, 2.0, 1.1]),
-        );
+        let left = velocity(&background, 2.0, [0.4, -2.0, 1.1]);
+        let right = velocity(&background, 2.0, [0.4, 2.0, 1.1]);
         assert!(
             left.iter().zip(right).all(|(a, b)| (a - b).abs() < 1e-12),
             "periodic sides"
@@ -289,11 +288,13 @@ mod tests {
     #[test]
     fn the_noise_has_the_stated_level_and_the_constant_of_the_published_formula() {
         let noise = Perturbation::noise(1.0, 1.0, 0.01, None);
-        let (mut sum, mut count) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut count = 0.0;
         for i in 0..20 {
             for j in -10..=10 {
                 for k in -10..=10 {
-                    let (y, z) = (0.03 * f64::from(j), 0.03 * f64::from(k));
+                    let y = 0.03 * f64::from(j);
+                    let z = 0.03 * f64::from(k);
                     if y.hypot(z) < 0.3 {
                         for side in [-0.5, 0.5] {
                             let there =

@@ -36,7 +36,8 @@ fn left_and_right_mirror_each_other_to_round_off() {
     let (flow, records) = history(&plane([96, 48]), 0.5, 1.0);
     let v = flow.face_velocity_m_s(1);
     let w = flow.face_velocity_m_s(2);
-    let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+    let mut worst = 0.0_f64;
+    let mut largest = 0.0_f64;
     for k in 0..48 {
         for j in 1..96 {
             worst = worst.max((v[k * 96 + j] + v[k * 96 + 96 - j]).abs());
@@ -67,7 +68,8 @@ fn over_a_frictionless_ground_the_pair_follows_the_hyperbola() {
     };
     let (_, records) = history(&pair, 0.25, 1.0);
     for record in records.iter().skip(1) {
-        let (y, z) = (record.right.y_m, record.right.z_m);
+        let y = record.right.y_m;
+        let z = record.right.z_m;
         let invariant = 1.0 / (y * y) + 1.0 / (z * z);
         assert!((invariant / 5.0 - 1.0).abs() < 0.04, "{y}, {z}");
     }
@@ -126,10 +128,8 @@ fn a_pair_in_si_units_is_the_reduced_one_scaled() {
         small.step().unwrap();
         large.step().unwrap();
     }
-    let (a, b) = (
-        meters.0.measure(&small).unwrap(),
-        meters.1.measure(&large).unwrap().reduced(&scales),
-    );
+    let a = meters.0.measure(&small).unwrap();
+    let b = meters.1.measure(&large).unwrap().reduced(&scales);
     for (a, b) in [
         (a.time_s, b.time_s),
         (a.right.y_m, b.right.y_m),

@@ -281,7 +281,8 @@ mod tests {
             Direction::between(21, 0.0, 2.0, Wall::Slip, Wall::Slip),
         ] {
             let line = Operators1d::new(&direction);
-            let (closed, rotated) = (Basis::new(&line), Basis::rotations(&line));
+            let closed = Basis::new(&line);
+            let rotated = Basis::rotations(&line);
             for (a, b) in closed.value.iter().zip(&rotated.value) {
                 assert!((a - b).abs() <= 1e-13 * a, "{direction:?}: {a} against {b}");
             }

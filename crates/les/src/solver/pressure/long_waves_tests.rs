@@ -55,7 +55,8 @@ fn residual_by_parts(layout: &Layout, g: &[f64], phi: &[f64]) -> f64 {
     let mut left: Vec<f64> = g.iter().map(|g| -g).collect();
     for (b, stride) in [1, n[0], n[0] * n[1]].into_iter().enumerate() {
         let line = &layout.line[b];
-        let (gradient, divergence) = (line.gradient(), line.stored_divergence());
+        let gradient = line.gradient();
+        let divergence = line.stored_divergence();
         for (p, left) in left.iter_mut().enumerate() {
             let at = layout.shape.index(p);
             let first = p - at[b] * stride;
@@ -123,7 +124,8 @@ fn meshes() -> Vec<(String, Layout)> {
 
 #[test]
 fn every_solve_meets_the_tolerance_or_says_that_round_off_forbids_it() {
-    let (mut met, mut refused) = (0, 0);
+    let mut met = 0;
+    let mut refused = 0;
     for (name, layout) in meshes() {
         for (kind, g) in [("long", long_waves(&layout)), ("rough", rough(&layout))] {
             for method in [PressureMethod::Direct, PressureMethod::Multigrid] {
@@ -253,7 +255,8 @@ fn an_iteration_of_multigrid_gains_a_factor_of_ten_on_odd_sizes_strong_stretchin
                 .solve(&mut g.clone(), tolerance)
             {
                 Ok(solved) => {
-                    let (n, factor) = (solved.iterations, solved.factor.unwrap());
+                    let n = solved.iterations;
+                    let factor = solved.factor.unwrap();
                     println!("| {about} | {kind} | {tolerance:.0e} | {n} | {factor:.3} |");
                     assert!(factor <= 0.1, "{about}, {kind}: {solved:?}");
                 }

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 /// 2-norm of the residual over that of the right side `g`.
 fn relative_residual(operator: &Operator, g: &[f64], phi: &[f64]) -> Result<f64, Error> {
-    let (left, size) = (operator.residual_norm(g, phi)?, norm(&operator.slabs, g)?);
+    let left = operator.residual_norm(g, phi)?;
+    let size = norm(&operator.slabs, g)?;
     Ok(if size > 0.0 { left / size } else { 0.0 })
 }
 
@@ -35,7 +36,8 @@ pub(super) fn turbulent_right_side(layout: &Layout) -> Vec<f64> {
             }
         };
         g.par_chunks_mut(n[0]).enumerate().for_each(|(r, row)| {
-            let (j, k) = (r % n[1], r / n[1]);
+            let j = r % n[1];
+            let k = r / n[1];
             for (i, g) in row.iter_mut().enumerate() {
                 let at = [i, j, k];
                 let stride = [1, n[0], n[0] * n[1]][b];
@@ -72,7 +74,8 @@ fn eddies(shape: Shape, b: usize) -> Vec<f64> {
         .par_chunks_mut(n[0])
         .enumerate()
         .for_each(|(r, row)| {
-            let (j, k) = (r % n[1], r / n[1]);
+            let j = r % n[1];
+            let k = r / n[1];
             for (i, velocity) in row.iter_mut().enumerate() {
                 let hash =
                     (i * 73_856_093 + j * 19_349_663 + k * 83_492_791 + b * 2_654_435) % 1_000_003;
@@ -267,13 +270,12 @@ fn the_operator_is_symmetric_and_ignores_constants() {
                 .map(|p| (p as f64 * f).sin())
                 .collect::<Vec<f64>>()
         };
-        let (a, b) = (wave(0.7), wave(1.3));
+        let a = wave(0.7);
+        let b = wave(1.3);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (ab, ba, aa) = (
-            dot(&a, &apply(&b)),
-            dot(&b, &apply(&a)),
-            dot(&a, &apply(&a)),
-        );
+        let ab = dot(&a, &apply(&b));
+        let ba = dot(&b, &apply(&a));
+        let aa = dot(&a, &apply(&a));
         assert!(
             (ab - ba).abs() <= 1e-12 * aa.abs(),
             "{name}: {ab} against {ba}"
@@ -299,10 +301,8 @@ fn the_operator_is_the_divergence_of_the_gradient() {
         .collect();
     let mut expected = vec![0.0; phi.len()];
     for (b, stride) in [1, n0, n0 * n1].into_iter().enumerate() {
-        let (gradient, divergence) = (
-            layout.line[b].gradient(),
-            layout.line[b].stored_divergence(),
-        );
+        let gradient = layout.line[b].gradient();
+        let divergence = layout.line[b].stored_divergence();
         for (p, expected) in expected.iter_mut().enumerate() {
             let at = layout.shape.index(p);
             let first = p - at[b] * stride;
@@ -495,10 +495,8 @@ fn multigrid_agrees_with_the_direct_solver_and_converges_as_fast_on_every_mesh()
         let mut multigrid = PressureSolver::new(&layout, PressureMethod::Multigrid);
         let mut phi = g.clone();
         let solved = multigrid.solve(&mut phi, 1e-6).unwrap();
-        let (factor, residual) = (
-            solved.factor.unwrap_or(0.0),
-            relative_residual(&operator, &g, &phi).unwrap(),
-        );
+        let factor = solved.factor.unwrap_or(0.0);
+        let residual = relative_residual(&operator, &g, &phi).unwrap();
         let found = format!(
             "{name}: {} iterations, factor {factor:.3}, residual {residual:.1e}",
             solved.iterations

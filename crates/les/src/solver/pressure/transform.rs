@@ -312,7 +312,8 @@ mod tests {
             (Direction::periodic(20, 0.0, 3.0).stretched(sine), 1),
         ] {
             let line = Operators1d::new(&direction);
-            let (n, width) = (line.cells, 37);
+            let n = line.cells;
+            let width = 37;
             let Basis { value, vector } = Basis::new(&line);
             let fold = Fold::new(n, &vector);
             assert_eq!(fold.blocks.len(), blocks, "{direction:?}");

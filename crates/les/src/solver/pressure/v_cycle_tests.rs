@@ -77,7 +77,9 @@ fn a_cycle_is_symmetric() {
                 .map(|(a, b)| f64::from(a[l] * b[l]))
                 .sum::<f64>()
         };
-        let (one, other, size) = (dot(&g, &bf), dot(&f, &bg), dot(&f, &bf));
+        let one = dot(&g, &bf);
+        let other = dot(&f, &bg);
+        let size = dot(&f, &bf);
         assert!(
             (one - other).abs() < 2e-6 * size && size > 0.0,
             "{l}: {one} {other} of {size}"
@@ -167,7 +169,8 @@ fn relaxed_lines_leave_no_residual_in_all_kinds_of_directions() {
         for b in &kinds {
             let level = level(second_order(b), second_order(a));
             let n = level.axes[0].len() * level.axes[1].len();
-            let (mut u, f) = (wave(n, 0.3), wave(n, 0.7));
+            let mut u = wave(n, 0.3);
+            let f = wave(n, 0.7);
             relaxed(&level, 1, &mode, &mut u, &f);
             let left = left_over(&level, &mode, &u, &f);
             assert!(left < 2e-5, "{a:?} {b:?}: {left}");

@@ -93,7 +93,8 @@ fn plan(path: &Path, pause_after_steps: Option<u64>) -> RunPlan {
 fn checkpoints_have_the_same_bytes_and_continue_on_any_other_number_of_ranks() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.ckpt");
-    let (case, bytes) = (wake(), || std::fs::read(&path).unwrap());
+    let case = wake();
+    let bytes = || std::fs::read(&path).unwrap();
     let advance = |pause: Option<u64>, count: usize| {
         let mut seen = on_threads(count, |ranks| {
             let mut witness = Witness::default();

@@ -117,7 +117,8 @@ fn a_paused_and_resumed_run_gives_the_same_records_and_outputs_as_one_that_was_n
         let mut run = Run::new(flow(), with_checkpoint(Some(pause))).unwrap();
         let is_complete = run.to_end(&mut witness).unwrap();
         assert_eq!((run.flow().steps(), is_complete), (pause, pause == total));
-        let (mesh, settings) = (run.flow().mesh().clone(), run.flow().settings().clone());
+        let mesh = run.flow().mesh().clone();
+        let settings = run.flow().settings().clone();
         let (mut run, user_data) =
             Run::resume(&path, mesh, settings, with_checkpoint(None)).unwrap();
         assert_eq!(user_data, (pause as usize).to_le_bytes());
@@ -396,7 +397,8 @@ fn steps_that_feed_a_flow_more_than_it_loses_are_told_of_and_stop_it() {
             .to_end(&mut witness);
         (result, witness.warnings)
     };
-    let (ab2, rk3) = (TimeScheme::AdamsBashforth2, TimeScheme::RungeKutta3);
+    let ab2 = TimeScheme::AdamsBashforth2;
+    let rk3 = TimeScheme::RungeKutta3;
     // A model that is there but does next to nothing.
     let (result, _) = run(1e6, ab2, 0.35, 0.005);
     let Err(Error::StepFeeds {
@@ -491,7 +493,8 @@ fn a_failing_output_stops_the_run_and_leaves_the_checkpoint_before_it() {
         matches!(&error, Error::Stopped { step: 10, reason, .. } if reason.contains("space")),
         "{error}"
     );
-    let (mesh, settings) = (flow().mesh().clone(), flow().settings().clone());
+    let mesh = flow().mesh().clone();
+    let settings = flow().settings().clone();
     let (mut run, _) = Run::resume(&path, mesh, settings, plan).unwrap();
     assert!(run.flow().steps() < 10);
     // The output that failed is given again.

@@ -29,8 +29,11 @@ impl Limits {
     /// # Errors
     /// What estimators and signals refuse; a checked scene gives none.
     pub fn new(plan: &Plan) -> Result<Self, Error> {
-        let (scene, instrument) = (plan.scene(), &plan.instrument);
-        let (receiver, pulse, d) = (&instrument.receiver, &instrument.pulse, &scene.detector);
+        let scene = plan.scene();
+        let instrument = &plan.instrument;
+        let receiver = &instrument.receiver;
+        let pulse = &instrument.pulse;
+        let d = &scene.detector;
         let mut found = Self {
             values: Vec::new(),
             lines: Vec::new(),
@@ -104,10 +107,8 @@ impl Limits {
     }
 
     fn velocities(&mut self, plan: &Plan) {
-        let (d, half_m) = (
-            &plan.scene().detector,
-            0.5 * plan.scene().laser.wavelength_m,
-        );
+        let d = &plan.scene().detector;
+        let half_m = 0.5 * plan.scene().laser.wavelength_m;
         let band_m_s = 0.5 * half_m * d.bandwidth_hz;
         let (low_m_s, high_m_s) = sampled_velocities_m_s(plan.scene());
         let flow_m_s = plan.fastest_m_s;
@@ -123,7 +124,8 @@ impl Limits {
 
     fn phase_noise(&mut self, plan: &Plan) -> Result<(), Error> {
         let scene = plan.scene();
-        let (wavelength_m, linewidth_hz) = (scene.laser.wavelength_m, scene.laser.linewidth_hz);
+        let wavelength_m = scene.laser.wavelength_m;
+        let linewidth_hz = scene.laser.linewidth_hz;
         let window_s = scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
         let delay_s = 2.0 * scene.scan.range_min_m / SPEED_OF_LIGHT_M_S;
         let mean_m_s = mean_frequency_sd_m_s(wavelength_m, linewidth_hz, delay_s, window_s);

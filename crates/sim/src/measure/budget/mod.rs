@@ -53,7 +53,8 @@ pub const TOTAL: &str = "= SNR in the band";
 
 /// The ranges of a scan at which a budget is of use, m: first, middle, last.
 pub fn scan_ranges_m(scene: &Scene) -> Vec<f64> {
-    let (first_m, last_m) = (scene.scan.range_min_m, scene.scan.range_max_m);
+    let first_m = scene.scan.range_min_m;
+    let last_m = scene.scan.range_max_m;
     vec![first_m, 0.5 * (first_m + last_m), last_m]
 }
 
@@ -188,7 +189,8 @@ impl<'a> Rows<'a> {
 
     /// The ratio in the width of the pulse, and the echo of the pulse before.
     fn beside_the_ratio(&mut self) -> Result<(), Error> {
-        let (scene, instrument) = (self.plan.scene(), &self.plan.instrument);
+        let scene = self.plan.scene();
+        let instrument = &self.plan.instrument;
         let width_hz = instrument.pulse.spectral_full_width_half_maximum_hz();
         let gain_db = decibels(scene.detector.bandwidth_hz / width_hz);
         let fwhm_s = instrument.gaussian_fwhm_s();
@@ -265,13 +267,13 @@ impl<'a> Rows<'a> {
 
     /// From the photons of the pulse to the electrons that it gives.
     fn transmitter_and_path(&mut self, efficiency: &EfficiencyProfile) -> Result<(), Error> {
-        let (scene, instrument) = (self.plan.scene(), &self.plan.instrument);
-        let (telescope, receiver, t) = (
-            &instrument.telescope,
-            &instrument.receiver,
-            &scene.telescope,
-        );
-        let (energy_j, photon_j) = (scene.pulse.energy_j, receiver.photon_energy_j());
+        let scene = self.plan.scene();
+        let instrument = &self.plan.instrument;
+        let telescope = &instrument.telescope;
+        let receiver = &instrument.receiver;
+        let t = &scene.telescope;
+        let energy_j = scene.pulse.energy_j;
+        let photon_j = receiver.photon_energy_j();
         let area_m2 = telescope.aperture_area_m2();
         let solid_angle = |r: f64| area_m2 / (r * r);
         let sent = format!("{} / {photon_j:.2e} J", si(energy_j, "J"));
@@ -383,12 +385,12 @@ impl<'a> Rows<'a> {
 
     /// What the receiver loses against the shot-noise limit.
     fn receiver(&mut self) {
-        let (scene, instrument) = (self.plan.scene(), &self.plan.instrument);
-        let (receiver, front) = (
-            &instrument.receiver,
-            scene.detector.front_end.unwrap_or_default(),
-        );
-        let (lost, n) = (receiver.penalties(), receiver.noise_densities());
+        let scene = self.plan.scene();
+        let instrument = &self.plan.instrument;
+        let receiver = &instrument.receiver;
+        let front = scene.detector.front_end.unwrap_or_default();
+        let lost = receiver.penalties();
+        let n = receiver.noise_densities();
         let FrontEnd {
             saturation_w,
             half_power_hz,
@@ -409,7 +411,8 @@ impl<'a> Rows<'a> {
             value,
             -lost.saturation_db,
         );
-        let (amplifier_a2_hz, shot_a2_hz) = (n.amplifier_a2_hz, n.shot_a2_hz);
+        let amplifier_a2_hz = n.amplifier_a2_hz;
+        let shot_a2_hz = n.shot_a2_hz;
         let root = si(amplifier_a2_hz.sqrt(), "A/rtHz");
         let value = format!("{root}: {amplifier_a2_hz:.1e} of shot {shot_a2_hz:.1e}");
         self.or_none(

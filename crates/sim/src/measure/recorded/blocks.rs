@@ -52,10 +52,8 @@ pub(super) fn scans<S: Sample>(
         .iter()
         .try_for_each(|spectra| spectra.fit_a_file(plan))?;
     let layer_snr = Scanner::expected_layer_snr(plan, observer)?;
-    let (range_m, most_bytes) = (
-        &plan.geometry.gate_range_m,
-        options.block_bytes.unwrap_or(BLOCK_BYTES),
-    );
+    let range_m = &plan.geometry.gate_range_m;
+    let most_bytes = options.block_bytes.unwrap_or(BLOCK_BYTES);
     let mut out = Vec::with_capacity(scans.len());
     // Repetitions of a scan share what was made for the first.
     for alike in scans.chunk_by(|a, b| a.elevation_rad == b.elevation_rad) {

@@ -150,7 +150,8 @@ pub(super) fn scans(
     let all: Vec<usize> = (0..count).collect();
     // Pulses of a line may share its time; a time that goes back begins another line.
     for line in all.chunk_by(|a, b| marks[*a] == marks[*b] && time_s[*b] >= time_s[*a]) {
-        let (first, last) = (line[0], line[line.len() - 1]);
+        let first = line[0];
+        let last = line[line.len() - 1];
         // The middle of angles that pulses may have of their own.
         let beside = elevation_rad[first..=last]
             .iter()
@@ -248,7 +249,8 @@ fn interpolate(
 
 /// Angles as the scene has them.
 fn of_scene(plan: &Plan, records: &RawRecords) -> Result<Vec<f64>, Error> {
-    let (count, lines) = (records.records, &plan.geometry.elevation_rad);
+    let count = records.records;
+    let lines = &plan.geometry.elevation_rad;
     let per_line = plan.scene().scan.pulses_per_line;
     let whole = lines.len() * per_line;
     if !count.is_multiple_of(whole) {

@@ -323,7 +323,8 @@ fn of_run<S: Sample>(
     observer: &dyn Observer,
 ) -> Result<Box<VelocityEstimates>, Error> {
     let scanner = Scanner::new(plan, observer)?;
-    let (lines, pulses) = (plan.geometry.elevation_rad.len() as u64, scanner.pulses());
+    let lines = plan.geometry.elevation_rad.len() as u64;
+    let pulses = scanner.pulses();
     let read = |realisation: usize, sums: &mut [WindowSums<'_, S>]| {
         let scan = realisation * pulses..(realisation + 1) * pulses;
         for piece in pieces(scan.clone(), records.samples) {

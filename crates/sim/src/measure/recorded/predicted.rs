@@ -30,10 +30,8 @@ impl PredictedError {
     /// For regions of a scan of a scene that have at most the radius `largest_m`.
     pub(crate) fn new(plan: &Plan, places: ScanGeometry, largest_m: f64) -> Result<Self, Error> {
         let is_noisy = plan.scene().detector.noise != NoiseModel::None;
-        let (of_rays, count) = (
-            RayInformation::new(plan, &[])?,
-            places.most_gates(largest_m),
-        );
+        let of_rays = RayInformation::new(plan, &[])?;
+        let count = places.most_gates(largest_m);
         let of_snr = |db: f64| of_rays.of_snr(10f64.powf(0.1 * db), count);
         // Without noise no estimate has a ratio.
         let snr_db: Vec<f64> = SNR_DB.filter(|_| is_noisy).map(f64::from).collect();
@@ -169,7 +167,8 @@ mod tests {
             let places = places(plan.scene(), &plan.geometry).unwrap();
             let predicted = PredictedError::new(&plan, places, 3.0).unwrap();
             let count = map.bias_m_s.len() as f64;
-            let (mut found_m_s, mut stated_m_s) = (0.0, 0.0);
+            let mut found_m_s = 0.0;
+            let mut stated_m_s = 0.0;
             for (bias_m_s, truth_m_s) in map.bias_m_s.iter().zip(&map.v_pulse_m_s) {
                 found_m_s += bias_m_s / count;
                 stated_m_s += predicted.bias_m_s(truth_m_s + bias_m_s, 10.0) / count;

@@ -139,7 +139,8 @@ fn quietest(plan: &Plan, scan: &ScanCells) -> f64 {
 pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, Error> {
     type Of = fn(&MeasuredScan) -> &Array2<f64>;
     let scene = plan.scene();
-    let (azimuth_rad, pulses) = (scene.scan.azimuth_rad, scene.scan.pulses_per_line as u32);
+    let azimuth_rad = scene.scan.azimuth_rad;
+    let pulses = scene.scan.pulses_per_line as u32;
     let of_scan = |(sweep, scan): (usize, &MeasuredScan)| -> Vec<Ray> {
         let rays = scan.lines.elevation_rad.iter().zip(&scan.lines.time_s);
         rays.map(|(&elevation_rad, &time_s)| Ray {

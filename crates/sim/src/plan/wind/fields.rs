@@ -45,7 +45,8 @@ impl Placed {
     /// A position of the scene in the axes of the file, whose origin is at `origin_m`.
     fn own_m(&self, [x, y, z]: &[f64; 3], origin_m: [f64; 3]) -> [f64; 3] {
         let (sin, cos, [x0, y0, z0]) = (self.sin, self.cos, origin_m);
-        let (x, y) = (x - x0, y - y0);
+        let x = x - x0;
+        let y = y - y0;
         [cos * x + sin * y, self.side * (cos * y - sin * x), z - z0]
     }
 }
@@ -57,7 +58,8 @@ impl Wind for Placed {
         time_s: f64,
         out_m_s: &mut [[f64; 3]],
     ) -> Result<(), LesError> {
-        let (sin, cos) = (self.sin, self.cos);
+        let sin = self.sin;
+        let cos = self.cos;
         let origin_m = self.origin_m(time_s);
         let mut turned = Vec::with_capacity(BATCH);
         for (points, outs) in points_m.chunks(BATCH).zip(out_m_s.chunks_mut(BATCH)) {
@@ -173,7 +175,8 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
             "flow.time_s = {start_s:?}: the fields are from {first_s:?} to {last_s:?} s"
         )));
     }
-    let (mut steepest_per_s, mut fastest_m_s) = (0.0_f64, 0.0_f64);
+    let mut steepest_per_s = 0.0_f64;
+    let mut fastest_m_s = 0.0_f64;
     let ends_s = [
         start_s,
         if flow.motion == SimulatedMotion::Moving {
@@ -183,10 +186,8 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
         },
     ];
     let used = |i: usize| {
-        let (before, after) = (
-            times_s.get(i + 1),
-            i.checked_sub(1).and_then(|i| times_s.get(i)),
-        );
+        let before = times_s.get(i + 1);
+        let after = i.checked_sub(1).and_then(|i| times_s.get(i));
         before.is_none_or(|t| *t > ends_s[0]) && after.is_none_or(|t| *t < ends_s[1])
     };
     for (_, field) in all.iter().enumerate().filter(|(i, _)| used(*i)) {

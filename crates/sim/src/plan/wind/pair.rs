@@ -298,7 +298,8 @@ mod tests {
                 .unwrap();
             out
         };
-        let (own, added) = (velocity(&own), velocity(&added));
+        let own = velocity(&own);
+        let added = velocity(&added);
         for (a, b) in own.as_flattened().iter().zip(added.as_flattened()) {
             assert!((a - b).abs() < 1e-12, "{a} {b}");
         }

@@ -12,7 +12,8 @@ use wakescope_les::{Error as LesError, GridSnapshot};
 
 /// Edges in the units and at the place of the scene.
 fn edges(flow: &SimulatedFlow, edges: Edges, shift_m: f64) -> Edges {
-    let (length_m, speed_m_s) = (flow.length_unit_m, flow.velocity_unit_m_s);
+    let length_m = flow.length_unit_m;
+    let speed_m_s = flow.velocity_unit_m_s;
     let side = |side: Side| match side {
         Side::Open => Side::Open,
         Side::SlipWall { position_m } => Side::SlipWall {
@@ -42,11 +43,9 @@ fn snapshots(
     flow: &SimulatedFlow,
     planes: &CrossPlanes,
 ) -> Result<Vec<(f64, GridSnapshot)>, LesError> {
-    let (length_m, speed_m_s, shift_y_m) = (
-        flow.length_unit_m,
-        flow.velocity_unit_m_s,
-        flow.lateral_position_m,
-    );
+    let length_m = flow.length_unit_m;
+    let speed_m_s = flow.velocity_unit_m_s;
+    let shift_y_m = flow.lateral_position_m;
     let mesh = PlaneMesh {
         y_m: planes
             .y_m
@@ -83,7 +82,8 @@ pub(super) fn simulated(flow: &SimulatedFlow, file: &SceneFile) -> Result<SceneW
         path: path.clone(),
         reason,
     };
-    let (mut times, mut all) = (Vec::new(), Vec::new());
+    let mut times = Vec::new();
+    let mut all = Vec::new();
     for path in files(&path).map_err(of_key)? {
         let planes = read(&path).map_err(of_key)?;
         let of_file = |e: LesError| Error::Input {
@@ -103,7 +103,8 @@ pub(super) fn simulated(flow: &SimulatedFlow, file: &SceneFile) -> Result<SceneW
     let count = all.len();
     let series = Series::new(all).map_err(|e| refuse(format!("the times of the planes: {e}")))?;
     let (start_s, tau) = start(flow, &times).map_err(&refuse)?;
-    let (first_s, last_s) = (times[0][1], times[count - 1][1]);
+    let first_s = times[0][1];
+    let last_s = times[count - 1][1];
     let source = format!(
         "{count} planes of {first_s:.4} to {last_s:.4} s from {}",
         path.display()
@@ -126,7 +127,8 @@ fn start(flow: &SimulatedFlow, times: &[[f64; 2]]) -> Result<(f64, f64), String>
         (None, None) => return Ok((first[1], first[0])),
     };
     // Ages of files are rounded: the first and the last plane are meant.
-    let (low, high) = (first[from], last[from]);
+    let low = first[from];
+    let high = last[from];
     let clamped = given.clamp(low, high);
     let x = if (given - clamped).abs() <= 1e-9 * high.abs() {
         clamped

@@ -65,7 +65,9 @@ fn mass(layout: &Layout, index: [usize; 3], at_faces: &[usize]) -> f64 {
 /// both over the sum of moduli.
 fn work_and_contraction(flow: &Modelled, probe: &[Vec<f64>; 3]) -> (f64, f64) {
     let layout = &flow.layout;
-    let (mut work, mut contraction, mut moduli) = (0.0, 0.0, 0.0);
+    let mut work = 0.0;
+    let mut contraction = 0.0;
+    let mut moduli = 0.0;
     for (component, force) in flow.acceleration().iter().enumerate() {
         for (place, force) in force.iter().enumerate() {
             work += mass(layout, flow.index(place), &[component]) * force * probe[component][place];

@@ -25,9 +25,11 @@ fn linear(g: [[f64; 3]; 3]) -> impl Fn([f64; 3]) -> [f64; 3] {
 
 #[test]
 fn the_eddy_viscosity_of_a_uniform_gradient_is_the_closed_form() {
-    let (cells, h) = ([14, 13, 15], [0.1, 0.2, 0.05]);
+    let cells = [14, 13, 15];
+    let h = [0.1, 0.2, 0.05];
     let square = (0.1_f64 * 0.2 * 0.05).powf(2.0 / 3.0);
-    let (a, w) = (3.0, 2.0);
+    let a = 3.0;
+    let w = 2.0;
     let cases = [
         // Plane shear: |S| = a, no WALE.
         ([[0.0, a, 0.0], [0.0; 3], [0.0; 3]], a, 0.0),
@@ -46,7 +48,8 @@ fn the_eddy_viscosity_of_a_uniform_gradient_is_the_closed_form() {
         // Rotation about x and shear across it: g = [[0, a, 0], [0, 0, -w], [0, w, 0]], g g = [[0,
         // 0, -a w], [0, -w^2, 0], [0, 0, -w^2]], Sd:Sd = 2/3 w^4 + (a w)^2/2, S:S = a^2/2.
         ([[0.0, a, 0.0], [0.0, 0.0, -w], [0.0, w, 0.0]], a, {
-            let (d, s) = (2.0 / 3.0 * w.powi(4) + 0.5 * (a * w).powi(2), 0.5 * a * a);
+            let d = 2.0 / 3.0 * w.powi(4) + 0.5 * (a * w).powi(2);
+            let s = 0.5 * a * a;
             d.powf(1.5) / (s.powf(2.5) + d.powf(1.25))
         }),
     ];
@@ -83,7 +86,8 @@ fn the_eddy_viscosity_of_a_uniform_gradient_is_the_closed_form() {
 
 #[test]
 fn the_viscosity_is_cut_where_the_shortest_wave_would_decay_faster_than_the_limit_and_only_there() {
-    let (cells, h) = ([14, 13, 15], [0.1, 0.2, 0.05]);
+    let cells = [14, 13, 15];
+    let h = [0.1, 0.2, 0.05];
     let rotation = linear([[0.0, -2.0, 0.0], [2.0, 0.0, 0.0], [0.0; 3]]);
     let mut flow = Modelled::new(slip_box(cells, h), SubgridModel::WALE, rotation);
     let middle = flow.at([7, 6, 7]);
@@ -103,7 +107,8 @@ fn the_viscosity_is_cut_where_the_shortest_wave_would_decay_faster_than_the_limi
 
 #[test]
 fn a_uniform_strain_makes_the_stress_twice_viscosity_times_strain() {
-    let (cells, h) = ([14, 13, 15], [0.1, 0.2, 0.05]);
+    let cells = [14, 13, 15];
+    let h = [0.1, 0.2, 0.05];
     let g = [[1.0, 2.0, -0.5], [0.7, -3.0, 1.1], [-1.3, 0.4, 2.0]];
     let flow = Modelled::new(slip_box(cells, h), SubgridModel::WALE, linear(g));
     let middle = flow.at([7, 6, 7]);
@@ -214,7 +219,8 @@ fn wale_grows_with_the_cube_of_the_distance_from_a_wall() {
     ];
     // Near the wall u and v grow with z, and w with z^2 so that no fluid is made.
     let field = move |[x, y, z]: [f64; 3]| {
-        let (a, b) = (tau * x, tau * y);
+        let a = tau * x;
+        let b = tau * y;
         [
             z * (a.sin() + 0.5 * b.sin()),
             z * (b.cos() + 0.7 * a.cos()),
@@ -243,10 +249,8 @@ fn wale_grows_with_the_cube_of_the_distance_from_a_wall() {
 /// Slope of the regression line.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
-    let (x, y) = (
-        points.iter().map(|p| p.0).sum::<f64>() / n,
-        points.iter().map(|p| p.1).sum::<f64>() / n,
-    );
+    let x = points.iter().map(|p| p.0).sum::<f64>() / n;
+    let y = points.iter().map(|p| p.1).sum::<f64>() / n;
     let (xy, xx) = points.iter().fold((0.0, 0.0), |s, p| {
         (s.0 + (p.0 - x) * (p.1 - y), s.1 + (p.0 - x).powi(2))
     });

@@ -39,7 +39,8 @@ impl Modelled {
         let velocity = faces(&mesh, &layout, field);
         let model = Subgrid::new(&layout, model).unwrap().unwrap();
         let field = || Aligned::zeros(layout.shape.len());
-        let (in_plane, first) = ([field(), field(), field()], field());
+        let in_plane = [field(), field(), field()];
+        let first = field();
         let mut modelled = Self {
             mesh,
             layout,
@@ -121,7 +122,8 @@ impl Modelled {
                 let mean = if a == b {
                     nu[place]
                 } else {
-                    let (p, q) = (before(place, a), before(place, b));
+                    let p = before(place, a);
+                    let q = before(place, b);
                     0.25 * (nu[place] + nu[p] + nu[q] + nu[before(p, b)])
                 };
                 strain[pair][place] *= 2.0 * mean;
@@ -141,10 +143,8 @@ fn index(layout: &Layout, place: usize) -> [usize; 3] {
 
 /// The values at the faces, zero on walls.
 fn faces(mesh: &Mesh, layout: &Layout, field: impl Fn([f64; 3]) -> [f64; 3]) -> [Vec<f64>; 3] {
-    let (face, centre) = (
-        [0, 1, 2].map(|d| mesh.face_m(d)),
-        [0, 1, 2].map(|d| mesh.centre_m(d)),
-    );
+    let face = [0, 1, 2].map(|d| mesh.face_m(d));
+    let centre = [0, 1, 2].map(|d| mesh.centre_m(d));
     std::array::from_fn(|component| {
         let value = |place| {
             let index = index(layout, place);

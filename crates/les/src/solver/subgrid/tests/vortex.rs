@@ -20,11 +20,13 @@ fn vortex(model: SubgridModel, circulation_fraction: impl Fn(f64) -> f64) -> Mod
 
 /// Root mean square of the stress where `y^2 + z^2 < radius^2`.
 fn rms_stress(flow: &Modelled, radius: f64) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
+    let mut sum = 0.0;
+    let mut count = 0.0;
     for ([a, b], stress) in PAIRS.into_iter().zip(flow.plain_stress()) {
         for (place, stress) in stress.iter().enumerate() {
             let [_, j, k] = flow.index(place);
-            let (y, z) = (j as f64 - 31.5, k as f64 - 31.5);
+            let y = j as f64 - 31.5;
+            let z = k as f64 - 31.5;
             if y * y + z * z < radius * radius {
                 sum += if a == b {
                     stress * stress
@@ -128,20 +130,24 @@ fn constants_of_the_multiscale_model_give_the_dissipation_of_wale_in_a_minus_fiv
     let middle = |i: usize| (i as f64 + 0.5) / STEPS as f64;
     for order in 1..=4_usize {
         let kept = |phase: f64| 1.0 - (0.5 * phase).sin().powi(2 * order as i32);
-        let (mut small, mut all) = (0.0, 0.0);
+        let mut small = 0.0;
+        let mut all = 0.0;
         // Midpoint rule over the octant of the sphere |k| < pi: k^2 E(k) = k^(1/3), uniform in
         // direction.
         for (i, j, l) in
             (0..STEPS * STEPS * STEPS).map(|p| (p / (STEPS * STEPS), p / STEPS % STEPS, p % STEPS))
         {
-            let (k, cosine, angle) = (PI * middle(i), middle(j), 0.5 * PI * middle(l));
+            let k = PI * middle(i);
+            let cosine = middle(j);
+            let angle = 0.5 * PI * middle(l);
             let sine = (1.0 - cosine * cosine).sqrt();
             let low =
                 kept(k * sine * angle.cos()) * kept(k * sine * angle.sin()) * kept(k * cosine);
             small += k.cbrt() * (1.0 - low);
             all += k.cbrt();
         }
-        let (share, constant) = (small / all, SubgridModel::multiscale_constant(0.5, order));
+        let share = small / all;
+        let constant = SubgridModel::multiscale_constant(0.5, order);
         assert!(
             (constant * constant * share / 0.25 - 1.0).abs() < 1e-3,
             "order {order}: {share}, {constant}"
