@@ -404,7 +404,7 @@ def ap1():
     return found
 
 
-def of_cones(number):
+def of_scans(number):
     """A number of the scans of each dissipation rate, with its standard error from leaving out one scan at a time."""
     of_rate = {}
     for row in rows("fig23"):
@@ -413,11 +413,11 @@ def of_cones(number):
 
 
 def ka1():
-    return of_cones(lambda rate, scans, b: mean([scan["eps23_m43_s2"] for scan in scans], b) / rate ** (2 / 3))
+    return of_scans(lambda rate, scans, b: mean([scan["eps23_m43_s2"] for scan in scans], b) / rate ** (2 / 3))
 
 
 def ka2():
-    return of_cones(lambda rate, scans, b: math.sqrt(mean([scan["reduced_square"] for scan in scans], b)))
+    return of_scans(lambda rate, scans, b: math.sqrt(mean([scan["reduced_square"] for scan in scans], b)))
 
 
 CLAIMS = {

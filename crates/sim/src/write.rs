@@ -103,11 +103,15 @@ fn list_estimates(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resul
     let estimates = result.map.as_ref();
     let map = estimates.map(|estimates| velocity_map(plan, estimates));
     list_map(plan, map.as_ref(), files)?;
-    let winds = match &map {
-        Some(map) => winds_of_map(plan, map, &WindOptions::of_scene(plan.scene())?)?,
-        None => None,
-    };
+    let mut winds = None;
     if pattern.has_beam_winds() {
+        if let Some(map) = &map {
+            winds = Some(winds_of_map(
+                plan,
+                map,
+                &WindOptions::of_scene(plan.scene())?,
+            )?);
+        }
         files.table("wind", winds.as_ref(), |winds| Ok(table_with_truth(winds)))?;
     }
     #[cfg(feature = "plots")]

@@ -1,4 +1,5 @@
-//! Figure 23, beyond the chapter: dissipation rate and wind of simulated cones, as they are and as `wakescope wind` finds them.
+//! Figure 23, beyond the chapter: dissipation rate of simulated RHI scans and wind of cones, as they are and as `wakescope wind` finds
+//! them.
 
 use super::context::*;
 use rayon::prelude::*;
@@ -11,7 +12,7 @@ use wakescope_sim::write::velocity_map;
 const DISSIPATIONS_M2_S3: [f64; 3] = [4e-5, 5e-4, 1.45e-2];
 const MORE_M2_S3: [f64; 2] = [1e-5, 3e-3];
 
-/// One layer holds the whole scan: a dissipation rate is not negative, and the mean over layers that noise rules is too large.
+/// One layer holds the whole scan: a dissipation rate is not negative, and the mean over layers dominated by noise is too large.
 const WHOLE_M: f64 = 1e4;
 
 /// The ratio of mean eps^(2/3) that is found to the true one: peaks of spectra raise it by some percent.
@@ -20,47 +21,60 @@ const FOUND: Bar = Bar::Between(0.97, 1.14);
 /// Errors of the wind over their stated deviations.
 const STATED: Bar = Bar::Between(0.75, 1.3);
 
-/// A cone of 24 beams at 60 degrees in a logarithmic wind, at 0 dB.
+/// Scans at 0 dB in a wind that grows linearly with height, as the fit assumes, so that no shear is taken for turbulence.
 const SCENE: &str = r#"
 [detector.snr]
 reference = "fixed"
 snr_db = 0.0
 [flow]
 kind = "wind"
+profile = "power"
+exponent = 1.0
 speed_m_s = 5.0
+reference_height_m = 400.0
 toward_rad = 1.0
 [[added_flows]]
 kind = "eddies"
 dissipation_m2_s3 = DISSIPATION
 outer_scale_m = 60.0
+[estimator]
+gate_step_samples = 64
+radius_m = 0.0
 [scan]
+realisations = 1
+"#;
+
+/// A cone of 24 beams at 60 degrees, which shows the wind.
+const CONE: &str = r#"
 pattern = { kind = "vad", elevation_rad = 1.0471975511965976, beams = 24 }
 range_min_m = 90.0
 range_max_m = 960.0
-realisations = 1
-[estimator]
-gate_step_samples = 64
 "#;
 
-/// A scan of a cone.
-struct Cone {
-    /// Mean over its heights of eps^(2/3) \[m^(4/3)/s²\].
+/// An RHI of 43 lines and 11 ranges, whose neighbouring lines show the turbulence.
+const RHI: &str = r#"
+elevation_min_rad = 0.04
+elevation_max_rad = 0.208
+elevation_step_rad = 4e-3
+range_min_m = 300.0
+range_max_m = 690.0
+"#;
+
+/// A cone and an RHI in the same air.
+struct Scans {
+    /// eps^(2/3) of the RHI \[m^(4/3)/s²\].
     eps23: f64,
-    /// Mean square of the errors of the east and north wind over their stated deviations.
+    /// Of the cone, mean square of the errors of the east and north wind over their stated deviations.
     reduced_square: f64,
-    /// Speed at the middle height, found and true \[m/s\].
+    /// Of the cone, speed at the middle height, found and true \[m/s\].
     speed_m_s: [f64; 2],
 }
 
-impl Cone {
-    fn new(winds: &MapWinds) -> Self {
-        let rows = &winds.profiles.rows;
-        let mut eps23 = Vec::new();
+impl Scans {
+    fn new(rhi: &MapWinds, cone: &MapWinds) -> Self {
+        let rows = &cone.profiles.rows;
         let mut squares = Vec::new();
-        for (row, true_m_s) in rows.iter().zip(&winds.true_m_s) {
-            if row.edr_m23_s.is_finite() {
-                eps23.push(row.edr_m23_s.powi(2));
-            }
+        for (row, true_m_s) in rows.iter().zip(&cone.true_m_s) {
             for (found, true_m_s) in [row.east_m_s, row.north_m_s].into_iter().zip(true_m_s) {
                 let reduced = (found.value - true_m_s) / found.std;
                 if reduced.is_finite() {
@@ -69,24 +83,35 @@ impl Cone {
             }
         }
         let middle = rows.len() / 2;
-        let [east_m_s, north_m_s, _] = winds.true_m_s[middle];
+        let [east_m_s, north_m_s, _] = cone.true_m_s[middle];
         Self {
-            eps23: mean(&eps23, None),
+            eps23: mean_eps23(rhi),
             reduced_square: mean(&squares, None),
             speed_m_s: [rows[middle].speed_m_s.value, east_m_s.hypot(north_m_s)],
         }
     }
 }
 
-/// The cones of one dissipation rate.
+/// Mean over heights, which share one layer.
+fn mean_eps23(winds: &MapWinds) -> f64 {
+    let mut eps23 = Vec::new();
+    for row in &winds.profiles.rows {
+        if row.edr_m23_s.is_finite() {
+            eps23.push(row.edr_m23_s.powi(2));
+        }
+    }
+    mean(&eps23, None)
+}
+
+/// The scans of one dissipation rate.
 struct Row {
     dissipation_m2_s3: f64,
-    cones: Vec<Cone>,
+    scans: Vec<Scans>,
 }
 
 impl Row {
     fn eps23(&self) -> Estimate {
-        Estimate::mean(&column(&self.cones, |cone| cone.eps23))
+        Estimate::mean(&column(&self.scans, |scan| scan.eps23))
     }
 
     fn ratio(&self) -> Estimate {
@@ -94,7 +119,7 @@ impl Row {
     }
 
     fn reduced_rms(&self) -> Estimate {
-        let squares = column(&self.cones, |cone| cone.reduced_square);
+        let squares = column(&self.scans, |scan| scan.reduced_square);
         Estimate::of(squares.len(), |without| mean(&squares, without).sqrt())
     }
 }
@@ -109,16 +134,20 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut rows = Vec::new();
     for dissipation_m2_s3 in dissipations_m2_s3 {
         let text = SCENE.replace("DISSIPATION", &format!("{dissipation_m2_s3:?}"));
-        let cones: Result<Vec<Cone>, Failure> = (0..scans as u64)
+        let found: Result<Vec<Scans>, Failure> = (0..scans as u64)
             .into_par_iter()
-            .map(|scan| cone(context, &text, scan))
+            .map(|scan| {
+                let rhi = winds(context, &format!("{text}{RHI}"), scan)?;
+                let cone = winds(context, &format!("{text}{CONE}"), scan)?;
+                Ok(Scans::new(&rhi, &cone))
+            })
             .collect();
         rows.push(Row {
             dissipation_m2_s3,
-            cones: cones?,
+            scans: found?,
         });
     }
-    let origin = context.provenance_of_formula(SCENE);
+    let origin = context.provenance_of_formula(&format!("{SCENE}{RHI}{CONE}"));
     let mut out = Rendered::new(&table(&rows), &picture(&rows), &origin)?;
     out.values = vec![scans.to_string()];
     let mut found = Vec::new();
@@ -133,12 +162,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 }
 
 /// The winds of one scan.
-fn cone(context: &Context, text: &str, scan: u64) -> Result<Cone, Failure> {
+fn winds(context: &Context, text: &str, scan: u64) -> Result<MapWinds, Failure> {
     let own = Context {
         seed: context.seed + scan,
         ..context.clone()
     };
-    let file = own.scene_file(SceneFile::parse(text, Path::new("cone.toml"))?.content)?;
+    let file = own.scene_file(SceneFile::parse(text, Path::new("scan.toml"))?.content)?;
     let plan = Plan::new(file, Target::Map)?;
     let estimates = run(&plan, &Silent)?.map;
     let estimates = estimates.ok_or_else(|| Failure::new("the run has no map".into()))?;
@@ -146,20 +175,22 @@ fn cone(context: &Context, text: &str, scan: u64) -> Result<Cone, Failure> {
         layer_m: WHOLE_M,
         ..WindOptions::of_scene(plan.scene())?
     };
-    let winds = winds_of_map(&plan, &velocity_map(&plan, &estimates), &options)?;
-    let winds = winds.ok_or_else(|| Failure::new("the scan has no winds".into()))?;
-    Ok(Cone::new(&winds))
+    Ok(winds_of_map(
+        &plan,
+        &velocity_map(&plan, &estimates),
+        &options,
+    )?)
 }
 
 fn table(rows: &[Row]) -> Table {
-    let mut scans = Vec::new();
+    let mut lines = Vec::new();
     for row in rows {
-        for cone in &row.cones {
-            let [found_m_s, true_m_s] = cone.speed_m_s;
-            scans.push([
+        for scan in &row.scans {
+            let [found_m_s, true_m_s] = scan.speed_m_s;
+            lines.push([
                 row.dissipation_m2_s3,
-                cone.eps23,
-                cone.reduced_square,
+                scan.eps23,
+                scan.reduced_square,
                 found_m_s,
                 true_m_s,
             ]);
@@ -167,7 +198,7 @@ fn table(rows: &[Row]) -> Table {
     }
     numbers_table(
         "dissipation_m2_s3 eps23_m43_s2 reduced_square speed_m_s speed_true_m_s",
-        &scans,
+        &lines,
     )
 }
 
@@ -190,9 +221,9 @@ fn picture(rows: &[Row]) -> Figure {
         let true_m23_s = row.dissipation_m2_s3.cbrt();
         diagonal.push((true_m23_s, true_m23_s));
         means.push((true_m23_s, row.eps23().value.sqrt()));
-        for cone in &row.cones {
-            single.push((true_m23_s, cone.eps23.sqrt()));
-            for (points, speed_m_s) in speeds.iter_mut().zip(cone.speed_m_s) {
+        for scan in &row.scans {
+            single.push((true_m23_s, scan.eps23.sqrt()));
+            for (points, speed_m_s) in speeds.iter_mut().zip(scan.speed_m_s) {
                 points.push((true_m23_s, speed_m_s));
             }
         }

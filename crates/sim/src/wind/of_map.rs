@@ -50,7 +50,7 @@ pub(crate) fn gate_stride(scene: &Scene) -> usize {
     (samples / estimator.gate_step_samples.max(1) as f64).ceil() as usize
 }
 
-/// The winds of a scan whose beams determine them, VAD and DBS; a window for each sweep. The options of its own scene are
+/// The winds of a scan, as far as its beams determine them; a window for each sweep. The options of its own scene are
 /// [`WindOptions::of_scene`].
 ///
 /// # Errors
@@ -59,14 +59,11 @@ pub fn winds_of_map(
     plan: &Plan,
     map: &VelocityMap,
     options: &WindOptions,
-) -> Result<Option<MapWinds>, Error> {
-    if !plan.scene().scan.pattern.has_beam_winds() {
-        return Ok(None);
-    }
+) -> Result<MapWinds, Error> {
     let (windows, reference, _) = windows(ray_sweeps(&plan.geometry.schedule, map), Every::Sweep)?;
     let profiles = wind_profiles(&windows, reference, options)?;
     let true_m_s = true_winds_m_s(plan, map, &windows, &profiles)?;
-    Ok(Some(MapWinds { profiles, true_m_s }))
+    Ok(MapWinds { profiles, true_m_s })
 }
 
 /// The lines of sight of the first realisation.

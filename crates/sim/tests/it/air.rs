@@ -332,7 +332,6 @@ fn the_true_wind_of_a_vad_is_the_mean_wind() {
     let map = wakescope_sim::write::velocity_map(&plan, &map);
     let options = wakescope_sim::wind::WindOptions::of_scene(plan.scene()).unwrap();
     let winds = wakescope_sim::wind::winds_of_map(&plan, &map, &options).unwrap();
-    let winds = winds.unwrap();
     assert!(!winds.true_m_s.is_empty());
     // The flight is to the north, and so is the wind.
     for wind in winds.true_m_s {

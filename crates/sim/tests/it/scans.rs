@@ -251,7 +251,7 @@ fn vad_and_dbs_of_a_scan_determine_the_wind_with_its_standard_errors() {
             &velocity_map(&plan, &map),
             &WindOptions::of_scene(plan.scene()).unwrap(),
         );
-        let winds = found.unwrap().unwrap();
+        let winds = found.unwrap();
         assert_eq!(winds.profiles.rows.len(), 2 * map.range_m.len());
         // White noise on the beams of a cone, in the horizontal components.
         let sigma_m_s = map.std_m_s.mean().unwrap();
