@@ -208,19 +208,18 @@ impl Background {
         }
     }
 
-    /// The turbulence that was found in a scan, and its part of the variance of the optimum contrast of a white pattern of unit length; none of
-    /// other backgrounds.
-    pub(crate) fn turbulent_part(&self, pattern: &[f64]) -> Option<(&ScanTurbulence, f64)> {
+    /// Part of the turbulence that was found in a scan of the variance of the optimum contrast of a white pattern of unit length; none of other
+    /// backgrounds.
+    pub(crate) fn turbulent_part(&self, pattern: &[f64]) -> Option<f64> {
         let Self::Turbulent(whitening, Some(known)) = self else {
             return None;
         };
-        let (noise_m2_s2, found) = &**known;
         let contrast = whitening.contrast(pattern);
         let mut of_noise = 0.0;
-        for (weight, noise_m2_s2) in contrast.iter().zip(noise_m2_s2) {
+        for (weight, noise_m2_s2) in contrast.iter().zip(&known.0) {
             of_noise += weight * weight * noise_m2_s2;
         }
-        Some((found, (1.0 - of_noise).max(0.0)))
+        Some((1.0 - of_noise).max(0.0))
     }
 }
 

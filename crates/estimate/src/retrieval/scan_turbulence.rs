@@ -25,6 +25,8 @@ use crate::wind_profile::{
 const LARGEST_BLOCK: usize = 512;
 /// Fewest degrees of freedom that the variance of a contrast has.
 const FEWEST_DEGREES: f64 = 5.0;
+/// As many are as good as a known variance.
+const MOST_DEGREES: f64 = 1e6;
 /// Fewest contrasts that tell turbulence from noise.
 const FEWEST_CONTRASTS: usize = 30;
 
@@ -39,6 +41,8 @@ pub struct ScanTurbulence {
     pub outer_scale_probability: [f64; OUTER_SCALES_M.len()],
     /// eps^(2/3) at each outer scale times its probability.
     pub(crate) eps23_weights: [f64; OUTER_SCALES_M.len()],
+    /// Covariance of eps^(2/3) and of the factor of the noise were the outer scale known.
+    pub(crate) known_scale_covariance: [[f64; 2]; 2],
     /// Variance of the noise over that of the given standard deviations.
     pub(crate) noise_factor: f64,
     /// Whether it was found beside a wake, not beside the wind alone.
@@ -61,23 +65,16 @@ impl ScanTurbulence {
         logarithm.exp()
     }
 
-    /// Chi-square of one degree that is as probable as that of a contrast over a variance which is itself known to some degrees of freedom only:
-    /// `part` of it is of this turbulence. With s the sum of squares that gave the variance, t of Student is normal by Wallace's (1959)
-    /// transformation z² = k² ν ln(1 + t²/ν), k = (8ν + 1)/(8ν + 3); beside the wind alone s contains the contrast, so that
-    /// 1 + t²/ν = (ν + 1)/(ν + 1 - T).
-    pub(crate) fn chi2_of_known_variance(&self, chi2: f64, part: f64) -> f64 {
-        let uncertainty = part * self.eps23.std / self.eps23.value.max(f64::MIN_POSITIVE);
-        let all_degrees = (2.0 / (uncertainty * uncertainty)).max(FEWEST_DEGREES);
-        let degrees = match self.is_beside_wake {
-            true => all_degrees,
-            false => all_degrees - 1.0,
-        };
-        let ratio = match self.is_beside_wake {
-            true => 1.0 + chi2 / degrees,
-            false => all_degrees / (all_degrees - chi2).max(1e-3 * all_degrees),
-        };
-        let k = (8.0 * degrees + 1.0) / (8.0 * degrees + 3.0);
-        k * k * degrees * ratio.ln()
+    /// Degrees of freedom of the variance of a contrast, of which `part` is of this turbulence and the rest noise: 2 over its relative variance. What
+    /// is not known of the outer scale moves eps^(2/3) the other way and leaves the variance of patterns of the size of a wake, so that it does not
+    /// count.
+    pub(crate) fn degrees_of_freedom(&self, part: f64) -> f64 {
+        let of_turbulence = part / self.eps23.value.max(f64::MIN_POSITIVE);
+        let of_noise = (1.0 - part) / self.noise_factor.max(f64::MIN_POSITIVE);
+        let [[turbulence, both], [_, noise]] = self.known_scale_covariance;
+        let of_both = 2.0 * of_turbulence * of_noise * both;
+        let relative = of_turbulence.powi(2) * turbulence + of_both + of_noise.powi(2) * noise;
+        (2.0 / relative.max(0.0)).clamp(FEWEST_DEGREES, MOST_DEGREES)
     }
 
     /// Variance of a component of the velocity at a point \[m²/s²\].
@@ -195,6 +192,7 @@ impl Remainder {
             noise_std_m_s: 0.0,
             outer_scale_probability: [0.0; OUTER_SCALES_M.len()],
             eps23_weights: [0.0; OUTER_SCALES_M.len()],
+            known_scale_covariance: [[0.0; 2]; 2],
             noise_factor: 0.0,
             is_beside_wake: true,
         };
@@ -205,6 +203,10 @@ impl Remainder {
             found.eps23.value += probability * fit.eps23;
             found.noise_factor += probability * fit.noise_m2_s2;
             square += probability * (fit.eps23 * fit.eps23 + fit.covariance[0][0]);
+            let sums = found.known_scale_covariance.iter_mut().flatten();
+            for (sum, own) in sums.zip(fit.covariance.iter().flatten()) {
+                *sum += probability * own;
+            }
         }
         found.eps23.std = (square - found.eps23.value.powi(2)).max(0.0).sqrt();
         let squares: f64 = self.noise_std_m_s.iter().map(|std| std * std).sum();

@@ -13,7 +13,7 @@ use crate::error::{Error, enough_velocities, increasing, not_empty, positive};
 use crate::linalg::cholesky::cholesky;
 use crate::linalg::positive_definite::solve;
 use crate::matched_filter::{Background, Cells, MatchedFilter, wind_velocities};
-use crate::retrieval::{Gate, ScanMap};
+use crate::retrieval::{Gate, ScanMap, ScanTurbulence};
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use crate::wake_detection::bank::{Bank, DetectorOptions, Template};
 
@@ -21,6 +21,9 @@ use crate::wake_detection::bank::{Bank, DetectorOptions, Template};
 const MISSING: usize = 2;
 /// Of the variance of a product with a place: keeps the covariance of all of them regular, and changes nothing else.
 const REGULAR: f64 = 1e-9;
+
+/// Most wakes of the bank whose contrasts say how much of their variance is turbulence.
+const PARTS: usize = 32;
 
 /// What is nearer to a vortex than this \[m\] is not taken for background.
 const WAKE_M: f64 = 25.0;
@@ -40,7 +43,7 @@ pub struct WakeDetector {
 /// The test of one scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WakeStatistic {
-    /// T: what a wake explains of the best wind's chi-square; where the turbulence was found in the scan, as if it were known.
+    /// T: what a wake explains of the best wind's chi-square.
     pub value: f64,
     /// Sum of squares over the variances that is left of the scan after the best wind, over its degrees of freedom.
     pub wind_chi2_per_dof: f64,
@@ -149,7 +152,7 @@ impl WakeDetector {
         }
         let [along, across] = self.neighbour_correlation(&left, template);
         Ok(WakeStatistic {
-            value: self.of_known_background(value, template, length),
+            value,
             neighbour_correlation: (along.0, across.0),
             correlation_error: (along.1, across.1),
             wind_chi2_per_dof: rest / wind_dof as f64,
@@ -159,22 +162,28 @@ impl WakeDetector {
         })
     }
 
-    /// The statistic of a wake of the bank as if the background were known.
-    fn of_known_background(&self, value: f64, template: &Template, length: f64) -> f64 {
-        let Background::Turbulent(_, Some(_)) = self.filter.background else {
-            return value;
+    /// The turbulence that was found in the scan, if it was, and its part of the variance of the contrasts with the bank: the mean over some wakes.
+    pub(super) fn turbulent_part(&self) -> Option<(&ScanTurbulence, f64)> {
+        let Background::Turbulent(_, Some(known)) = &self.filter.background else {
+            return None;
         };
-        let mut pattern = vec![0.0; self.filter.cells.cells.len()];
-        for (place, sense) in template.iter().zip([-1.0, 1.0]) {
-            let Some(place) = place else { continue };
-            for (sum, shape) in pattern.iter_mut().zip(self.filter.shapes.row(*place)) {
-                *sum += sense * length * shape;
+        let stride = self.bank.templates.len().div_ceil(PARTS);
+        let mut sum = 0.0;
+        let mut count = 0.0;
+        for number in (0..self.bank.templates.len()).step_by(stride) {
+            let template = &self.bank.templates[number];
+            let mut pattern = vec![0.0; self.filter.cells.cells.len()];
+            for (place, sense) in template.iter().zip([-1.0, 1.0]) {
+                let Some(place) = place else { continue };
+                let factor = sense * self.reciprocal_length[number];
+                for (sum, shape) in pattern.iter_mut().zip(self.filter.shapes.row(*place)) {
+                    *sum += factor * shape;
+                }
             }
+            sum += self.filter.background.turbulent_part(&pattern)?;
+            count += 1.0;
         }
-        let found = self.filter.background.turbulent_part(&pattern);
-        found.map_or(value, |(turbulence, part)| {
-            turbulence.chi2_of_known_variance(value, part)
-        })
+        Some((&known.1, sum / count))
     }
 
     /// Puts the best wind into cells without a velocity; returns their number.

@@ -13,7 +13,7 @@
 
 use ndarray::{Array2, s};
 use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use std::f64::consts::PI;
 
 use crate::error::{Error, check, finite};
@@ -39,7 +39,7 @@ pub struct EmptyScanLaw {
 
 impl WakeDetector {
     /// The law of the statistic in scans of wind, noise and the turbulence of the options: `scans` are drawn, each from the
-    /// generator that `stream` gives for its number.
+    /// generator that `stream` gives for its number; turbulence that was found in a scan is known as well as it can be found there.
     ///
     /// # Errors
     /// As [`EmptyScanLaw::new`].
@@ -48,13 +48,18 @@ impl WakeDetector {
         scans: usize,
         stream: impl Fn(u64) -> R + Sync + Send,
     ) -> Result<EmptyScanLaw, Error> {
-        EmptyScanLaw::new(
-            self.empty_products(scans, stream)
-                .rows()
-                .into_iter()
-                .map(|row| self.best(row).0)
-                .collect(),
-        )
+        let products = self.empty_products(scans, &stream);
+        let mut statistics = Vec::with_capacity(scans);
+        for row in products.rows() {
+            statistics.push(self.best(row).0);
+        }
+        if let Some((turbulence, part)) = self.turbulent_part() {
+            let degrees = turbulence.degrees_of_freedom(part);
+            let of_variance = stream(scans as u64);
+            let is_beside_wake = turbulence.is_beside_wake;
+            over_found_variance(&mut statistics, degrees, is_beside_wake, of_variance)?;
+        }
+        EmptyScanLaw::new(statistics)
     }
 
     /// Products of empty scans with all places: scans by places.
@@ -78,6 +83,31 @@ impl WakeDetector {
         ndarray::concatenate(ndarray::Axis(0), &views)
             .unwrap_or_else(|_| Array2::zeros((0, places)))
     }
+}
+
+/// Statistics of scans with a known variance become those over a variance that is found in each scan to so many degrees of freedom: chi-square over
+/// these. Beside the wind alone the sum of squares has the contrast with the best wake in it, so that a larger one makes the variance larger; the
+/// mean of all has the usual best wake in it.
+fn over_found_variance(
+    statistics: &mut [f64],
+    degrees: f64,
+    is_beside_wake: bool,
+    mut generator: impl Rng,
+) -> Result<(), Error> {
+    let squares = ChiSquared::new(degrees).map_err(|_| Error::OutOfRange {
+        field: "degrees of freedom of the turbulence",
+        value: degrees,
+        allowed: "a positive number",
+    })?;
+    let mean = statistics.iter().sum::<f64>() / statistics.len().max(1) as f64;
+    for statistic in statistics {
+        let mut variance = squares.sample(&mut generator) / degrees;
+        if !is_beside_wake {
+            variance *= (degrees + *statistic) / (degrees + mean);
+        }
+        *statistic /= variance;
+    }
+    Ok(())
 }
 
 /// Rows times the transpose of a lower triangular matrix, whose zeros are left out block by block.

@@ -6,7 +6,7 @@ use super::data_files::each_usable;
 use super::data_sets::{self, SplitArgs, data_set_of};
 use super::options::{ON_DATA_SET, WITHOUT_DATA_SET, WITHOUT_SCANS, refusal_of_idle};
 use crate::Error;
-use crate::detection::scan_turbulence::{turbulence_json, turbulence_text};
+use crate::detection::scan_turbulence::{overlap_warning, turbulence_json, turbulence_text};
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test,
     scan_table, share_table,
@@ -113,6 +113,9 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
         }
         empty = scans.is_empty().then(|| noise.empty_scan(plan));
     }
+    if settings.options.turbulence == Some(Turbulence::OfScan) {
+        notes.extend(overlap_of(&scans, &settings));
+    }
     let (found, mut calibration) = test_scans(&scans, &settings, &*observer)?;
     if let Some(empty) = empty {
         let (lines, gates) = settings.stride;
@@ -187,6 +190,12 @@ fn of_flight(
         }
     }
     Ok(predicted)
+}
+
+/// The warning of gates that overlap after the stride, of the first scan.
+fn overlap_of(scans: &[ReadScan], settings: &DetectionSettings) -> Option<String> {
+    let first = scans.first()?.map.strided(1, settings.stride.1);
+    overlap_warning(&first.range_m, &settings.gate)
 }
 
 /// Tests scans for wakes; an error of a single one names its file.

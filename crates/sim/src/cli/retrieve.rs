@@ -10,7 +10,7 @@ use super::options::{
     BESIDE_GATE_STD, BESIDE_OWN_SCENE, BY_RADIAL_VELOCITIES, ESTIMATOR_BESIDE_GATE_STD, OF_MEANS,
     ON_DATA_SET, WITHOUT_DATA_SET, WITHOUT_SCENE, refusal_of_idle,
 };
-use crate::detection::scan_turbulence::turbulence_text;
+use crate::detection::scan_turbulence::{overlap_warning, turbulence_text};
 use crate::io::Provenance;
 use crate::io::scans::{ReadScan, are_of_one_plane, face_alike, plane_numbers, share_origin};
 use crate::outputs::Outputs;
@@ -468,6 +468,11 @@ fn of_map(
         None => Velocities::Unknown,
     };
     args.refuse_idle_on(&scan, velocities)?;
+    if args.air.turbulence == Some(Turbulence::OfScan) {
+        if let Some(text) = overlap_warning(&scan.map.range_m, &gate) {
+            observer.warn(&format!("{}: {text}", scan.path.display()));
+        }
+    }
     let options = RetrievalOptions {
         start,
         ..args.options(scene, gate)
