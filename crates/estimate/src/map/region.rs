@@ -176,6 +176,8 @@ pub struct ScanGeometry {
     elevation_rad: Vec<f64>,
     /// Direction of each line that is in no plane, and the lines that may share its regions; empty for a plane scan.
     sphere: Vec<([f64; 3], Range<usize>)>,
+    /// Greatest distance between the unit vectors of consecutive lines of a group; 0 for a plane scan.
+    largest_step: f64,
     pub(crate) rays: Rays,
     first_range_m: f64,
     spacing_m: f64,
@@ -265,9 +267,16 @@ impl ScanGeometry {
         record_samples: usize,
     ) -> Result<Self, Error> {
         sampling.validate()?;
+        let mut largest_step: f64 = 0.0;
+        for pair in sphere.windows(2) {
+            if pair[0].1 == pair[1].1 {
+                largest_step = largest_step.max(distance(&pair[0].0, &pair[1].0));
+            }
+        }
         Ok(Self {
             elevation_rad,
             sphere,
+            largest_step,
             rays,
             first_range_m: gates.range_m(0, sampling),
             spacing_m: gates.spacing_m(sampling),
@@ -338,26 +347,38 @@ impl ScanGeometry {
     pub fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
         let slack_m = 1e-6 * self.spacing_m;
         let radius_m = radius_m + slack_m;
-        let least_cos = least_cos_within(radius_m / point.range_m);
-        let near = self.lines_near(point, radius_m);
-        let near = near.filter(move |line| self.may_touch(point.line, *line, least_cos));
-        near.filter_map(move |line| {
-            let (sin, cos) = self.sin_cos_to(point.line, line);
-            let across_m = point.range_m * sin;
-            let along_m = point.range_m * cos;
-            let half_m = (radius_m * radius_m - across_m * across_m).sqrt();
-            // A line that misses the disc: max and min below would leave out the NaN.
-            if half_m.is_nan() {
-                return None;
+        let reach = reach_of_disc(radius_m / point.range_m);
+        let mut lines = self.lines_near(point, radius_m);
+        std::iter::from_fn(move || {
+            while let Some(line) = lines.next() {
+                let missed = self.lines_that_miss(point.line, line, reach);
+                if missed > 0 {
+                    lines.start = lines.start.saturating_add(missed - 1).min(lines.end);
+                } else if let Some(chord) = self.chord_of(point, radius_m, line) {
+                    return Some(chord);
+                }
             }
-            let first = self.gate_at(along_m - half_m).ceil().max(0.0);
-            let last = self.gate_at(along_m + half_m).floor();
-            let last = last.min(self.gates as f64 - 1.0);
-            (first <= last).then_some(Chord {
-                line,
-                first: first as usize,
-                last: last as usize,
-            })
+            None
+        })
+    }
+
+    /// The chord of a disc along a line.
+    fn chord_of(&self, point: PolarPoint, radius_m: f64, line: usize) -> Option<Chord> {
+        let (sin, cos) = self.sin_cos_to(point.line, line);
+        let across_m = point.range_m * sin;
+        let along_m = point.range_m * cos;
+        let half_m = (radius_m * radius_m - across_m * across_m).sqrt();
+        // A line that misses the disc: max and min below would leave out the NaN.
+        if half_m.is_nan() {
+            return None;
+        }
+        let first = self.gate_at(along_m - half_m).ceil().max(0.0);
+        let last = self.gate_at(along_m + half_m).floor();
+        let last = last.min(self.gates as f64 - 1.0);
+        (first <= last).then_some(Chord {
+            line,
+            first: first as usize,
+            last: last as usize,
         })
     }
 
@@ -382,17 +403,21 @@ impl ScanGeometry {
         start..end.max(start)
     }
 
-    /// Whether the cosine of the angle to a line that is in no plane lets it touch a disc. Most lines of a sweep do not, and chords
-    /// need sines.
-    fn may_touch(&self, line: LineOfSight, other: usize, least_cos: f64) -> bool {
+    /// How many lines from `other` on miss a disc on `line`, for all that is known without their angles: unit vectors of consecutive
+    /// lines of a group are at most [`Self::largest_step`] apart. 0 for lines in a plane, of which only those near are looked at.
+    fn lines_that_miss(&self, line: LineOfSight, other: usize, reach: f64) -> usize {
         let LineOfSight::Index(line) = line else {
-            return true;
+            return 0;
         };
-        let Some(([a, b, c], _)) = self.sphere.get(line) else {
-            return true;
+        let Some((direction, _)) = self.sphere.get(line) else {
+            return 0;
         };
-        let [d, e, f] = self.sphere[other].0;
-        a * d + b * e + c * f >= least_cos
+        let beyond = distance(direction, &self.sphere[other].0) - reach;
+        if beyond > 0.0 {
+            ((beyond / self.largest_step) as usize).saturating_add(1)
+        } else {
+            0
+        }
     }
 
     /// Elevation of a line of sight of a plane scan \[rad\].
@@ -460,14 +485,20 @@ impl ScanGeometry {
     }
 }
 
-/// Least cosine of the angle between lines one of which touches a disc about the other, by the ratio of radius to range; less by more
-/// than rounding, so that none is lost.
-fn least_cos_within(ratio: f64) -> f64 {
+/// Greatest distance between the unit vectors of two lines one of which touches a disc about the other, by the ratio of radius to
+/// range; greater by more than rounding, so that none is lost.
+fn reach_of_disc(ratio: f64) -> f64 {
     if ratio < 1.0 {
-        (1.0 - ratio * ratio).sqrt() - 1e-12
+        2.0 * (0.5 * ratio.asin()).sin() + 1e-9
     } else {
-        f64::NEG_INFINITY
+        f64::INFINITY
     }
+}
+
+/// Distance between two points.
+fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+    squares.sum::<f64>().sqrt()
 }
 
 /// Sine and cosine of the angle between two directions; the sine is not negative.

@@ -136,6 +136,11 @@ pub(super) struct Signals {
 }
 
 impl ScanArgs {
+    /// How velocities are read.
+    pub(super) fn format(&self) -> ScanFormat {
+        self.velocities.format()
+    }
+
     /// The scans of a file; raw signals go through the estimator of the scene, whose spectra are kept if requested.
     pub(super) fn read(
         &self,
@@ -147,7 +152,7 @@ impl ScanArgs {
         if is_signals(path) {
             return self.signals(path, scene, spectra, observer);
         }
-        let (maps, left_out) = scans::read(path, &self.velocities.format())?;
+        let (maps, left_out) = scans::read(path, &self.format())?;
         Ok(Scans {
             maps,
             left_out,

@@ -8,7 +8,7 @@ use crate::dataset::PLAN;
 use crate::dataset::plan::DatasetPlan;
 use crate::io::Provenance;
 use crate::io::data_set::{DataSet, Split};
-use crate::io::scans::{ReadScan, StoredLines};
+use crate::io::scans::{ReadScan, ScanFormat, StoredLines};
 use crate::outputs::Outputs;
 use crate::plan::Stage;
 use crate::progress::Observer;
@@ -67,7 +67,7 @@ pub(super) struct Found {
     pub(super) origin: Provenance,
 }
 
-/// Applies a method to the scans of each flight of some splits; the scene of the flight is that of one scan of the instrument in
+/// Applies a method to the scans of each flight of some splits, read as a format says; the scene of the flight is that of one scan of the instrument in
 /// still air.
 ///
 /// # Errors
@@ -75,6 +75,7 @@ pub(super) struct Found {
 pub(super) fn predict(
     folder: &Path,
     splits: &[Split],
+    format: &ScanFormat,
     (stage, observer): (Stage, &dyn Observer),
     method: impl Fn(usize, &SceneFile, Vec<ReadScan>) -> Result<Vec<PredictedScan>, Error> + Sync,
 ) -> Result<Found, Error> {
@@ -99,8 +100,8 @@ pub(super) fn predict(
     let found: Result<Vec<_>, Error> = flights
         .par_iter()
         .map(|flight| {
-            let scans = lines.scans_of_flight(&data_set, *flight)?;
-            let scene = instrument(&plan.flight(*flight)?.scene)?;
+            let scans = lines.scans_of_flight(&data_set, *flight, format)?;
+            let scene = plan.flight(*flight)?.scene.of_one_scan_in_still_air()?;
             let found = method(*flight, &scene, scans)?;
             observer.advance(1);
             Ok(found)
@@ -118,14 +119,6 @@ pub(super) fn predict(
         flights: flights.len(),
         origin,
     })
-}
-
-/// The scene of one scan of the instrument in still air.
-fn instrument(scene: &SceneFile) -> Result<SceneFile, Error> {
-    let still = scene.in_still_air()?;
-    let mut content = still.content.clone();
-    content.scan.head.sweeps = 1;
-    Ok(still.with(content)?)
 }
 
 /// What is said of a scan of a flight that a method refuses.

@@ -95,9 +95,12 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
         (stated, _) => stated,
     };
     let plan = match &scene {
-        Some(scene) => Some(Plan::new(scene.in_still_air()?, Target::Map)?),
+        Some(scene) => Some(Plan::new(scene.of_one_scan_in_still_air()?, Target::Map)?),
         None => None,
     };
+    if let Some(plan) = plan.as_ref().filter(|_| scans.is_empty()) {
+        refuse_other_patterns(plan)?;
+    }
     args.folder.prepare(cli, |files| list(args, None, files))?;
     let plan_scene = plan.as_ref().map(|plan| plan.scene());
     let (gate, note) = gate_of(scans.first(), args.air.gate_std, plan_scene)?;
@@ -134,6 +137,18 @@ pub(super) fn detect(args: &DetectArgs, cli: &Cli) -> Result<(), Error> {
     report(args, cli, &settings, result, &notes, origin)
 }
 
+/// Refuses a scene without files of scans unless its scan is one of a vertical plane.
+fn refuse_other_patterns(plan: &Plan) -> Result<(), Error> {
+    if plan.geometry.schedule.is_plane() {
+        return Ok(());
+    }
+    let reason = "\"rhi\" without files of scans: wakes are sought in scans of a vertical plane";
+    Err(plan.file.of_key(Error::Key {
+        key: "scan.pattern.kind",
+        reason: reason.into(),
+    }))
+}
+
 /// Predictions for the scans of a data set.
 fn of_data_set(args: &DetectArgs, folder: &Path, cli: &Cli) -> Result<(), Error> {
     cli.refuse_idle(folder, ON_DATA_SET)?;
@@ -144,6 +159,7 @@ fn of_data_set(args: &DetectArgs, folder: &Path, cli: &Cli) -> Result<(), Error>
     let found = data_sets::predict(
         folder,
         &splits,
+        &args.scans.format(),
         (Stage::Detection, &*observer),
         |flight, scene, scans| of_flight((args, cli.seed), (flight, scene), scans, &*observer),
     )?;

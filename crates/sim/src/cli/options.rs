@@ -40,7 +40,6 @@ pub(super) const ON_DATA_SET: &Idle = &[
     ("gate-std", IN_PLAN),
     ("field", CELLS),
     ("towards", CELLS),
-    ("min-snr", CELLS),
     ("scale", CELLS),
 ];
 const IN_PLAN: &str = "the plan of the data set has its instrument";

@@ -294,6 +294,7 @@ fn of_data_set(args: &RetrieveArgs, folder: &Path, cli: &Cli) -> Result<(), Erro
     let found = data_sets::predict(
         folder,
         &splits,
+        &args.scans.format(),
         (Stage::Retrieval, &*observer),
         |flight, scene, scans| of_flight(args, (flight, scene), scans, &*observer),
     )?;

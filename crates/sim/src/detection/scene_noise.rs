@@ -51,7 +51,7 @@ impl SceneNoise {
     /// # Errors
     /// What the crates refuse.
     pub fn new(plan: &Plan, observer: &dyn Observer) -> Result<Self, Error> {
-        let mut scene = plan.file.in_still_air()?.content;
+        let mut scene = plan.file.of_one_scan_in_still_air()?.content;
         scene.seed ^= SEED_BIT;
         let middle_rad = 0.5 * (scene.scan.elevation_min_rad + scene.scan.elevation_max_rad);
         let half_rad = 0.5 * LINES * scene.scan.elevation_step_rad;

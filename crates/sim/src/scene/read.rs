@@ -111,6 +111,18 @@ impl SceneFile {
         self.with(scene)
     }
 
+    /// One scan of [`Self::in_still_air`], also of a scene whose sweeps follow one another: methods that test or fit scans one by one
+    /// have its lines.
+    ///
+    /// # Errors
+    /// As [`Self::in_still_air`].
+    pub(crate) fn of_one_scan_in_still_air(&self) -> Result<Self, SceneError> {
+        let still = self.in_still_air()?;
+        let mut scene = still.content.clone();
+        scene.scan.head.sweeps = 1;
+        still.with(scene)
+    }
+
     /// An error of a key, or of a field that a library refuses and one key alone states, with the
     /// line of the file.
     pub(crate) fn of_key(&self, error: Error) -> Error {

@@ -127,8 +127,8 @@ fn refusals(folder: &Path) {
             "--scene has no effect: the plan",
         ),
         (
-            &["retrieve", "d", "--min-snr", "3"],
-            "--min-snr has no effect: the velocities",
+            &["retrieve", "d", "--towards"],
+            "--towards has no effect: the velocities",
         ),
         (
             &["retrieve", "d", "--method", "signals"],

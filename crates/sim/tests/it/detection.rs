@@ -190,6 +190,35 @@ fn a_scene_alone_says_what_would_be_found_in_it() {
     );
 }
 
+#[test]
+fn sweeps_that_follow_one_another_detect_what_one_of_them_does_and_other_patterns_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let sweeps = format!("{SCENE}[scan.head]\nsweeps = 3\ndirection = \"alternate\"\n");
+    let of = |name: &str, scene: &str| {
+        std::fs::write(folder.path().join(name), scene).unwrap();
+        let words = ["detect", "--scene", name, "--empty-scans", "2000", "--out"];
+        let out = name.replace(".toml", "");
+        json(folder.path(), &[&words[..], &[&out]].concat())
+    };
+    let one = of("one.toml", SCENE);
+    let three = of("three.toml", &sweeps);
+    for number in ["threshold", "smallest_detectable_m2_s"] {
+        assert_eq!(one[number], three[number]);
+    }
+    let ppi = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n[flow]\nkind = \"calm\"\n[scan]\npattern = { kind = \"ppi\" }\n";
+    std::fs::write(folder.path().join("ppi.toml"), ppi).unwrap();
+    let output = wakescope(
+        folder.path(),
+        &["detect", "--scene", "ppi.toml", "--out", "ppi"],
+    );
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        text.contains("scan.pattern.kind") && text.contains("vertical plane"),
+        "{text}"
+    );
+    assert!(output.status.code() == Some(2) && !folder.path().join("ppi").exists());
+}
+
 /// Nine scans of still air: a map of nine realisations has a third of the deviation of one, whatever the scene says that is given with it.
 #[test]
 fn a_map_of_several_realisations_is_tested_with_the_deviation_of_their_mean() {

@@ -2,7 +2,7 @@
 //!
 //! Check: the velocities of a store that is written and read; flagged cells are missing.
 
-use super::ReadScan;
+use super::{ReadScan, ScanFormat};
 use crate::Error;
 use crate::io::data_set::DataSet;
 use ndarray::{Array2, Array3, ArrayD, Axis, Ix4};
@@ -40,7 +40,8 @@ impl StoredLines {
         })
     }
 
-    /// The scans of a ready flight. Their sweeps are the numbers of the scans in it.
+    /// The scans of a ready flight, without the velocities that a format takes for noise. Their sweeps are the numbers of the scans
+    /// in it.
     ///
     /// # Errors
     /// Chunks that are missing or damaged, with their path; arrays without the axes of cells.
@@ -48,17 +49,24 @@ impl StoredLines {
         &self,
         data_set: &DataSet,
         flight: usize,
+        format: &ScanFormat,
     ) -> Result<Vec<ReadScan>, Error> {
         let velocity_m_s = cells(data_set, "velocity", flight)?;
         let sigma_m_s = cells(data_set, "velocity_standard_deviation", flight)?;
-        let flagged = cells(data_set, "flag", flight)?;
+        let mut is_missing = cells(data_set, "flag", flight)?.mapv(|flag| flag == 1.0);
+        if format.min_snr_db.is_some() {
+            let ratio_db = cells(data_set, "signal_to_noise_ratio", flight)?;
+            is_missing.zip_mut_with(&ratio_db, |is_missing, ratio_db| {
+                *is_missing |= format.is_noise(*ratio_db);
+            });
+        }
         let mut scans = Vec::with_capacity(data_set.scans_per_flight);
         for scan in 0..data_set.scans_per_flight {
             let mut velocity_m_s = self.scan_of(&velocity_m_s, scan);
             let sigma_m_s = self.scan_of(&sigma_m_s, scan);
-            let flagged = self.scan_of(&flagged, scan);
+            let is_missing = self.scan_of(&is_missing, scan);
             for (at, velocity_m_s) in velocity_m_s.indexed_iter_mut() {
-                if flagged[at] == 1.0 || sigma_m_s[at].is_nan() {
+                if is_missing[at] || sigma_m_s[at].is_nan() {
                     *velocity_m_s = f64::NAN;
                 }
             }
@@ -81,7 +89,7 @@ impl StoredLines {
     }
 
     /// The cells \[line, gate\] of a scan, by elevation.
-    fn scan_of(&self, flight: &Array3<f64>, scan: usize) -> Array2<f64> {
+    fn scan_of<T: Copy>(&self, flight: &Array3<T>, scan: usize) -> Array2<T> {
         flight
             .index_axis(Axis(0), scan)
             .select(Axis(0), &self.order)
@@ -139,6 +147,10 @@ mod tests {
             (packed("velocity", 0.005), velocity_m_s),
             (packed("velocity_standard_deviation", 0.002), vec![0.25; 12]),
             (whole("flag", &AXES), flagged),
+            (
+                packed("signal_to_noise_ratio", 0.01),
+                (0..12).map(f64::from).collect(),
+            ),
             (float("elevation", &AXES[2..3]), vec![10.0, 9.0, 8.0]),
             (float("azimuth", &AXES[2..3]), vec![90.0; 3]),
             (float("range", &AXES[3..]), vec![300.0, 305.0]),
@@ -168,7 +180,9 @@ mod tests {
         store(temp.path());
         let data_set = DataSet::open(temp.path()).unwrap();
         let lines = StoredLines::read(&data_set).unwrap();
-        let scans = lines.scans_of_flight(&data_set, 0).unwrap();
+        let scans = lines
+            .scans_of_flight(&data_set, 0, &ScanFormat::default())
+            .unwrap();
         assert_eq!((scans.len(), scans[1].sweep), (2, 1));
         let map = &scans[1].map;
         assert!(map.elevation_rad.is_sorted() && map.validate().is_ok());
@@ -180,6 +194,23 @@ mod tests {
     }
 
     #[test]
+    fn cells_of_a_low_signal_to_noise_ratio_are_missing_where_a_least_one_is_given() {
+        let temp = tempfile::tempdir().unwrap();
+        store(temp.path());
+        let data_set = DataSet::open(temp.path()).unwrap();
+        let lines = StoredLines::read(&data_set).unwrap();
+        let format = ScanFormat {
+            min_snr_db: Some(8.5),
+            ..ScanFormat::default()
+        };
+        let scans = lines.scans_of_flight(&data_set, 0, &format).unwrap();
+        assert!(scans[0].map.velocity_m_s.iter().all(|v| v.is_nan()));
+        let map = &scans[1].map;
+        let are_missing: Vec<bool> = map.velocity_m_s.iter().map(|v| v.is_nan()).collect();
+        assert_eq!(are_missing, [true, false, true, false, true, true]);
+    }
+
+    #[test]
     fn chunks_that_are_missing_are_refused_with_their_path() {
         let temp = tempfile::tempdir().unwrap();
         store(temp.path());
@@ -187,7 +218,10 @@ mod tests {
         std::fs::remove_file(root.join("flag/c/0/0/0/0")).unwrap();
         let data_set = DataSet::open(temp.path()).unwrap();
         let lines = StoredLines::read(&data_set).unwrap();
-        let refused = lines.scans_of_flight(&data_set, 0).unwrap_err().to_string();
+        let refused = lines
+            .scans_of_flight(&data_set, 0, &ScanFormat::default())
+            .unwrap_err()
+            .to_string();
         assert!(
             refused.contains("flag/c/0/0/0/0: this chunk of the store is missing"),
             "{refused}"
