@@ -262,7 +262,7 @@ pub(crate) const ALL: [Figure; 23] = [
     figure(
         "fig23",
         23,
-        "Turbulence and wind from cones",
+        "Turbulence and wind, put in and found",
         12.0,
         fig23::make,
     )
