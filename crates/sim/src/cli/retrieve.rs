@@ -469,10 +469,10 @@ fn of_map(
         None => Velocities::Unknown,
     };
     args.refuse_idle_on(&scan, velocities)?;
-    if args.air.turbulence == Some(Turbulence::OfScan) {
-        if let Some(text) = overlap_warning(&scan.map.range_m, &gate) {
-            observer.warn(&format!("{}: {text}", scan.path.display()));
-        }
+    if args.air.turbulence == Some(Turbulence::OfScan)
+        && let Some(text) = overlap_warning(&scan.map.range_m, &gate)
+    {
+        observer.warn(&format!("{}: {text}", scan.path.display()));
     }
     let options = RetrievalOptions {
         start,
