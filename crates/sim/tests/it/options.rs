@@ -682,10 +682,14 @@ fn idle(definition: &clap::Command, place: &Place<'_>, kind: &Kind) -> Vec<Strin
 fn check(kinds: &[Kind]) {
     let inputs = files(inputs().path());
     let definition = command();
-    let idle: Vec<String> = kinds
-        .par_iter()
-        .flat_map(|kind| idle(&definition, &Place::new(&inputs), kind))
-        .collect();
+    // Threads of its own: they wait for processes, and other tests need those of all.
+    let pool = rayon::ThreadPoolBuilder::new().build().unwrap();
+    let idle: Vec<String> = pool.install(|| {
+        kinds
+            .par_iter()
+            .flat_map(|kind| idle(&definition, &Place::new(&inputs), kind))
+            .collect()
+    });
     assert!(
         idle.is_empty(),
         "without effect and not refused:\n{}",
