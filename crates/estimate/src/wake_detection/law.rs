@@ -85,8 +85,8 @@ impl WakeDetector {
     }
 }
 
-/// Statistics of scans with a known variance become those over a variance that is found in each scan to so many degrees of freedom: chi-square over
-/// these. Beside the wind alone the sum of squares has the contrast with the best wake in it, so that a larger one makes the variance larger; the
+/// Divides statistics of scans with a known variance by a variance that is found in each scan, chi-square of `degrees` degrees of freedom
+/// over these, as in the F distribution. Beside the wind alone the sum of squares has the contrast with the best wake in it, so that a larger one makes the variance larger; the
 /// mean of all has the usual best wake in it.
 fn over_found_variance(
     statistics: &mut [f64],

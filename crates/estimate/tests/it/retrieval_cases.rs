@@ -157,7 +157,7 @@ pub(crate) fn mean(numbers: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Scatter {
-    /// Of so many scans made by `draw` from the exact one.
+    /// Of a number of scans made by `draw` from the exact one.
     pub(crate) fn of(
         case: &Case,
         draws: u64,

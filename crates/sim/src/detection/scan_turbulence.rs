@@ -49,7 +49,7 @@ pub(crate) fn overlap_warning(range_m: &[f64], gate: &Gate) -> Option<String> {
     let least_m = SHARED * gate.std_m();
     (step_m < least_m).then(|| {
         format!(
-            "gates are {step_m:.1} m apart and overlap: noise that neighbours share counts as turbulence, less of it with a step of \
+            "gates are {step_m:.1} m apart and overlap: noise that neighbours share counts as turbulence; choose a step of \
              {least_m:.0} m or more"
         )
     })
