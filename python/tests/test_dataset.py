@@ -11,6 +11,7 @@ import warnings
 from pathlib import Path
 
 import numpy
+import pandas
 import pytest
 import xarray
 from conftest import ROOT
@@ -165,3 +166,42 @@ def kill_a_worker(launcher: int) -> bool:
             os.kill(int(status.parent.name), signal.SIGKILL)
             return True
     return False
+
+
+def test_the_network_of_the_book_reads_the_truth_of_each_split(whole, small, monkeypatch, program):
+    monkeypatch.syspath_prepend(ROOT / "docs/src")
+    import posterior_data as data
+
+    assert not {"jax", "equinox", "optax"} & set(sys.modules)
+    read = [data.read(whole / "small", [split]) for split in range(4)]
+    # Three sites with six flights, one and one; eight flights at a site of its own; four scans each.
+    assert [len(scans.flight) for scans in read] == [72, 12, 12, 32]
+    scans = data.read(whole / "small", [data.TEST_HOME, data.TEST_AWAY])
+    ds = xarray.open_zarr(whole / "small/scans.zarr").load()
+    assert set(scans.flight) == set(ds.flight.values[ds.split.values >= 2])
+    assert set(scans.flight).isdisjoint([*read[data.TRAIN].flight, *read[data.VALIDATION].flight])
+    stored = ds.isel(flight=xarray.DataArray(scans.flight), scan=xarray.DataArray(scans.scan))
+    assert (stored.split.values == scans.split).all() and scans.inputs.shape == (44, 5, 25, 24)
+    missing = stored.flag.values == 1
+    velocity = 3.0 * (scans.inputs[:, 0] + scans.inputs[:, 1])
+    numpy.testing.assert_allclose(velocity[~missing], stored.velocity.values[~missing], atol=1e-5)
+    ratio_db = stored.signal_to_noise_ratio.fillna(0.0).values
+    numpy.testing.assert_allclose(10.0 * scans.inputs[:, 2], ratio_db, atol=1e-5)
+    for k, name in enumerate(["vortex_y", "vortex_z", "circulation_5_15"]):
+        true = numpy.where((stored.in_view.values == 1) & (stored.circulation_5_15.values >= 50.0), stored[name].values, numpy.nan)
+        numpy.testing.assert_array_equal(scans.targets[..., k], true)
+    # Two Gaussians on either side of the truth: no error, and a continuous ranked probability score by their standard deviation.
+    is_there = numpy.isfinite(scans.targets[..., 0])
+    true = numpy.nan_to_num(data.scaled_targets(scans))[:, :, None]
+    mean = numpy.concatenate([true - 0.3, true + 0.3], axis=2)
+    presence = numpy.where(is_there, 9.0, -9.0)
+    mixture = data.Mixture(presence, numpy.full((44, 2, 2), numpy.log(0.5)), mean, numpy.full(mean.shape, -2.0))
+    data.write_predictions(whole / "predictions.csv", scans, mixture)
+    program("score", whole / "small", whole / "predictions.csv", "--split", "test_home,test_away", "--out", whole / "scores")
+    scores = pandas.read_csv(whole / "scores/score.csv", comment="#").query("group == 'all'")
+    scores = scores.set_index(["quantity", "statistic"]).value
+    assert scores["vortices", "f1"] == 1.0 and scores["scans", "false_alarms"] == 0.0
+    for scale, quantity in zip(data.SCALE, ["y_m", "z_m", "gamma_5_15_m2_s"]):
+        deviation = scale * numpy.hypot(0.3, numpy.exp(-2.0))
+        assert scores[quantity, "rms"] < 1e-6
+        numpy.testing.assert_allclose(scores[quantity, "crps"], deviation * (2**0.5 - 1) / numpy.pi**0.5, rtol=1e-6)
