@@ -55,6 +55,17 @@ const CN2_TABLE: [(&str, &str); 5] = [
         "[1e-13, 1e-14]",
     ),
 ];
+const RETRIEVED: [(&str, &str); 6] = [
+    FIXED,
+    (
+        "added_flows",
+        "[{ kind = \"eddies\", dissipation_m2_s3 = 1e-2 }]",
+    ),
+    ("retrieval.methods", "[\"fit\"]"),
+    ("scan.elevation_max_rad", "0.22"),
+    ("scan.range_max_m", "460.0"),
+    ("estimator.gate_step_samples", "15"),
+];
 const PPI: [(&str, &str); 1] = [("scan.lidar_height_m", "20.0")];
 
 const KEYS: &[Key] = &[
@@ -867,6 +878,13 @@ const KEYS: &[Key] = &[
         "map",
         "v_mean_m_s",
     ),
+    (
+        "retrieval.turbulence",
+        &RETRIEVED,
+        ["\"none\"", "\"auto\""],
+        "run",
+        "gamma_std_m2_s",
+    ),
 ];
 
 fn small() -> Scene {
@@ -902,7 +920,7 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
             }
             bench.write("k.toml", &s.text());
             let words: &[&str] = match command {
-                "map" | "efficiency" => &[command, "k.toml", "--out", "k", "--overwrite"],
+                "map" | "efficiency" | "run" => &[command, "k.toml", "--out", "k", "--overwrite"],
                 _ => &[command, "k.toml"],
             };
             let ended = bench.run(words);
@@ -911,10 +929,10 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
                 ended.is_good,
                 &format!("{key} = {value}: {}", ended.stderr),
             );
-            let file = if command == "map" {
-                "k/map.csv"
-            } else {
-                "k/profile.csv"
+            let file = match command {
+                "map" => "k/map.csv",
+                "run" => "k/retrieval.csv",
+                _ => "k/profile.csv",
             };
             if column.is_empty() {
                 vec![ended.stdout]

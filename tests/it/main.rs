@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod circulation;
+mod circulations_through_signals;
 mod curves;
 mod extremes;
 mod point_target;

@@ -3,8 +3,10 @@
 //! Check: circulations of maps of a pair within their standard errors; pairs in narrow sectors; empty scans.
 
 use crate::error::Error;
+use crate::retrieval::estimates_in_turbulence::{Estimates, TurbulentFit};
 use crate::retrieval::{
-    Flag, Movement, RetrievalOptions, ScanEstimator, ScanFit, ScanMap, ScanResult, VortexResult,
+    Flag, Movement, RetrievalOptions, ScanEstimator, ScanFit, ScanMap, ScanResult, Turbulence,
+    VortexResult,
 };
 use crate::vortex_fit::map_fit::data::ends;
 use crate::vortex_fit::map_fit::starts::chi2;
@@ -187,13 +189,37 @@ impl EstimateFits<'_> {
         if moves { &self.moving } else { &self.still }
     }
 
+    /// A fit with the turbulence of the scan in its covariance, if that is requested.
+    ///
+    /// # Errors
+    /// What the covariance refuses.
+    fn in_turbulence(&self, fit: &MapFit, moves: bool) -> Result<Option<TurbulentFit>, Error> {
+        if self.options.turbulence != Some(Turbulence::OfScan) {
+            return Ok(None);
+        }
+        let estimates = Estimates {
+            scan: self.scan,
+            view: &self.view,
+            model: &self.options.model,
+            response: self.response(moves),
+            options: &self.map_options,
+        };
+        estimates.in_turbulence(fit)
+    }
+
     /// A pair that stands out of the wind, with the secondary vortices that the map shows beside it.
     ///
     /// # Errors
     /// What the fit of the pair refuses.
     fn pair(&self, found: &ScanResult) -> Result<ScanFit, Error> {
-        let mut options = self.options.clone();
         let (mut fit, moves) = self.best(None)?;
+        let turbulent = self.in_turbulence(&fit, moves)?;
+        if let Some(turbulent) = &turbulent
+            && turbulent.turbulence.stands_out()
+        {
+            return Ok(self.of_turbulent(found, turbulent, moves));
+        }
+        let mut options = self.options.clone();
         let response = self.response(moves);
         let four = fit_secondary_vortices(
             &self.view,
@@ -219,8 +245,12 @@ impl EstimateFits<'_> {
         .ok()
         .flatten();
         let are_local = local.is_some();
-        let fit = local.unwrap_or(fit);
+        let mut fit = local.unwrap_or(fit);
+        if let Some(turbulent) = &turbulent {
+            fit.covariance += &turbulent.of_air;
+        }
         let mut result = result_of(found, self.scan, &options, &fit, moves);
+        result.turbulence = turbulent.map(|turbulent| turbulent.turbulence);
         result.statistic = fit.statistic;
         result.threshold = self.map_options.least_statistic;
         result.set(Flag::SecondaryVortices, are_shown);
@@ -231,10 +261,28 @@ impl EstimateFits<'_> {
         })
     }
 
+    /// A pair in turbulence that stands out of the noise: what else is in the air is part of that.
+    fn of_turbulent(&self, found: &ScanResult, turbulent: &TurbulentFit, moves: bool) -> ScanFit {
+        let fit = &turbulent.fit;
+        let mut result = result_of(found, self.scan, self.options, fit, moves);
+        result.statistic = fit.statistic;
+        result.threshold = self.map_options.least_statistic;
+        result.turbulence = Some(turbulent.turbulence);
+        result.set(Flag::LocalCirculation, turbulent.is_local);
+        ScanFit {
+            result,
+            model: self.options.model,
+        }
+    }
+
     /// The one vortex that is found; another may be there beyond the scan.
     fn one(&self, found: &ScanResult) -> Option<ScanFit> {
         let (fit, moves) = self.best(found.wake.as_ref()).ok()?;
-        let result = result_of(found, self.scan, self.options, &fit, moves);
+        let turbulent = self.in_turbulence(&fit, moves).ok()?;
+        let turbulence = turbulent.as_ref().map(|found| found.turbulence);
+        let fit = turbulent.map_or(fit, |found| found.fit);
+        let mut result = result_of(found, self.scan, self.options, &fit, moves);
+        result.turbulence = turbulence;
         Some(ScanFit {
             result: result.reporting(|vortex| found.vortex(vortex.side).is_some()),
             model: self.options.model,

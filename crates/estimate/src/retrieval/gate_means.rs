@@ -9,7 +9,7 @@ use crate::retrieval::aliases::{self, CALM, Unfolded};
 use crate::retrieval::alternatives::with_alternatives;
 use crate::retrieval::hypotheses::{End, Kind, Stage, least, rivals};
 use crate::retrieval::report::{OUTLIER, Report};
-use crate::retrieval::scan_turbulence::{Remainder, gate_covariance};
+use crate::retrieval::scan_turbulence::{Remainder, gate_covariance, gate_positions};
 use crate::retrieval::whitening::Whitening;
 use crate::retrieval::{
     Covariance, Flag, Movement, RetrievalOptions, ScanMap, ScanResult, ScanTurbulence, Turbulence,
@@ -164,36 +164,12 @@ fn remainder_of(stage: &Stage<'_>, end: &End) -> Remainder {
     let rows = stage.squares.rows(&end.wake.to_array(), &end.groups);
     let cells = stage.squares.cells.iter();
     let noise_std_m_s = cells.map(|cell| cell.sigma_m_s).collect();
-    Remainder::new(gate_positions(stage, &end.wake), rows, noise_std_m_s)
+    Remainder::new(positions(stage, &end.wake), rows, noise_std_m_s)
 }
 
-/// Where the gates of a stage are in air that the wind of a wake carries along, in the plane of the scan.
-fn gate_positions(stage: &Stage<'_>, wake: &Wake) -> Vec<GatePosition> {
-    let carried_m_s = [mean_wind_m_s(stage, wake), 0.0, 0.0];
-    let mut gates = Vec::with_capacity(stage.squares.cells.len());
-    for cell in &stage.squares.cells {
-        let (sine, cosine) = stage.map.elevation_rad[cell.line].sin_cos();
-        let time_s = match stage.map.has_times() {
-            true => stage.map.time_s[cell.line],
-            false => 0.0,
-        };
-        let range_m = stage.map.range_m[cell.gate];
-        let direction = [cosine, 0.0, sine];
-        gates.push(GatePosition::new(direction, range_m, time_s, carried_m_s));
-    }
-    gates
-}
-
-/// Lateral wind of a wake at the mean height of the cells of a stage \[m/s\].
-fn mean_wind_m_s(stage: &Stage<'_>, wake: &Wake) -> f64 {
-    let mut height_m = 0.0;
-    for cell in &stage.squares.cells {
-        let range_m = stage.map.range_m[cell.gate];
-        let elevation_rad = stage.map.elevation_rad[cell.line];
-        height_m += stage.gates.model.position_m(range_m, elevation_rad).1;
-    }
-    let [.., wind_m_s, shear_per_s] = wake.to_array();
-    wind_m_s + shear_per_s * height_m / stage.squares.cells.len().max(1) as f64
+/// Where the gates of a stage are in air that the wind of a wake carries along.
+fn positions(stage: &Stage<'_>, wake: &Wake) -> Vec<GatePosition> {
+    gate_positions(stage.map, &stage.squares.cells, stage.gates.model, wake)
 }
 
 /// The result of rough ends, followed to their end with vortices that move or stand still, and a wake in another wind that explains the
@@ -340,7 +316,7 @@ fn whitening(stage: &Stage<'_>, turbulence: &Turbulence, about: &Wake) -> Result
         }
         Turbulence::VonKarman(found) => {
             let sigmas_m_s: Vec<f64> = cells.iter().map(|cell| cell.sigma_m_s).collect();
-            let gates = gate_positions(stage, about);
+            let gates = positions(stage, about);
             let table = gate_covariance(&gates, stage.options.gate.std_m())?;
             Whitening::new(found.covariance_m2_s2(&table, &gates, &sigmas_m_s))
         }

@@ -33,6 +33,7 @@ mod aliases;
 mod alternatives;
 mod envelope;
 mod estimates;
+mod estimates_in_turbulence;
 mod fit;
 mod gate_means;
 mod gates;

@@ -9,14 +9,16 @@
 //! hundred velocities of consecutive lines count as independent.
 //! Check: `circulations_in_turbulence` in the tests of the program.
 
-use ndarray::Array2;
+use ndarray::{Array2, s};
 
 use crate::Measured;
 use crate::error::Error;
 use crate::parallel::map_each;
-use crate::retrieval::Whitening;
+use crate::retrieval::{ScanMap, Whitening};
 use crate::turbulence::VonKarman;
+use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::map_fit::least_squares::Rows;
+use crate::vortex_fit::{Wake, WakeModel};
 use crate::wind_profile::{
     Block, GateCovariance, GatePosition, OUTER_SCALES_M, outer_scale_probabilities, spectra,
 };
@@ -29,6 +31,9 @@ const FEWEST_DEGREES: f64 = 5.0;
 const MOST_DEGREES: f64 = 1e6;
 /// Fewest contrasts that tell turbulence from noise.
 const FEWEST_CONTRASTS: usize = 30;
+
+/// Standard deviations that turbulence has to exceed, as in `wakescope wind`.
+const STANDS_OUT: f64 = 2.0;
 
 /// Isotropic turbulence with the spectrum of von Karman, as a scan shows it beside its wake.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +60,11 @@ impl ScanTurbulence {
     pub fn edr_m23_s(&self) -> [f64; 3] {
         let Measured { value, std } = self.eps23;
         [value, value - 1.96 * std, value + 1.96 * std].map(|eps23| eps23.max(0.0).sqrt())
+    }
+
+    /// Whether it exceeds two of its standard deviations.
+    pub(crate) fn stands_out(&self) -> bool {
+        self.eps23.value > STANDS_OUT * self.eps23.std
     }
 
     /// Outer scale \[m\]: mean of the logarithm over the probabilities.
@@ -92,6 +102,21 @@ impl ScanTurbulence {
         variance_m2_s2
     }
 
+    /// Covariance \[m²/s²\] of the velocities of the air in two gates.
+    pub(crate) fn covariance_of_air_m2_s2(
+        &self,
+        table: &GateCovariance,
+        [a, b]: [&GatePosition; 2],
+    ) -> f64 {
+        let mut of_scales = [0.0; OUTER_SCALES_M.len()];
+        table.covariance_into(a, b, &mut of_scales);
+        let mut sum_m2_s2 = 0.0;
+        for (value, weight) in of_scales.iter().zip(self.eps23_weights) {
+            sum_m2_s2 += weight * value;
+        }
+        sum_m2_s2
+    }
+
     /// Covariance \[m²/s²\] of the velocities of gates, the lower triangle filled, from the standard deviations of their noise \[m/s\] as they
     /// were given. The table is that of [`gate_covariance`] for these gates.
     pub(crate) fn covariance_m2_s2(
@@ -102,14 +127,8 @@ impl ScanTurbulence {
     ) -> Array2<f64> {
         let rows = map_each(gates.len(), |i| {
             let mut row = Vec::with_capacity(i + 1);
-            let mut values = [0.0; OUTER_SCALES_M.len()];
             for other in &gates[..=i] {
-                table.covariance_into(&gates[i], other, &mut values);
-                let mut sum = 0.0;
-                for (value, weight) in values.iter().zip(self.eps23_weights) {
-                    sum += weight * value;
-                }
-                row.push(sum);
+                row.push(self.covariance_of_air_m2_s2(table, [&gates[i], other]));
             }
             row
         });
@@ -130,6 +149,8 @@ pub(crate) struct Remainder {
     residual_m_s: Vec<f64>,
     /// Standard deviations of the noise \[m/s\], up to a common factor.
     noise_std_m_s: Vec<f64>,
+    /// Correlation of the noise, the lower triangle; none of independent noise.
+    noise_correlation: Option<Array2<f64>>,
     /// Derivatives of the fit by its parameters.
     slopes: Vec<Vec<f64>>,
 }
@@ -142,6 +163,7 @@ impl Remainder {
             residual_m_s: rows.residuals,
             slopes: rows.slopes,
             noise_std_m_s,
+            noise_correlation: None,
         };
         let Self {
             residual_m_s,
@@ -157,7 +179,15 @@ impl Remainder {
         remainder
     }
 
-    /// What makes the velocities white in turbulence; nothing if their covariance is singular.
+    /// The same with the correlation of the noise, of which the lower triangle is read.
+    pub(crate) fn with_correlated_noise(self, correlation: Array2<f64>) -> Self {
+        Self {
+            noise_correlation: Some(correlation),
+            ..self
+        }
+    }
+
+    /// What makes the velocities white in turbulence, with independent noise; nothing if their covariance is singular.
     pub(crate) fn whitening(
         &self,
         turbulence: &ScanTurbulence,
@@ -230,10 +260,16 @@ impl Remainder {
             let block = Block::of_residuals(
                 self.gates[range.clone()].to_vec(),
                 self.residual_m_s[range.clone()].to_vec(),
-                self.noise_std_m_s[range].to_vec(),
+                self.noise_std_m_s[range.clone()].to_vec(),
                 &columns,
             )?;
-            blocks.push(block);
+            blocks.push(match &self.noise_correlation {
+                Some(all) => {
+                    let own = all.slice(s![range.clone(), range]);
+                    block.with_correlated_noise(own.to_owned())?
+                }
+                None => block,
+            });
         }
         Ok(blocks)
     }
@@ -248,6 +284,40 @@ pub(crate) fn gate_covariance(
     gate_std_m: f64,
 ) -> Result<GateCovariance, Error> {
     GateCovariance::new(gate_std_m, &OUTER_SCALES_M, farthest_m(gates))
+}
+
+/// Where the gates of cells of a scan are in air that the wind of a wake carries along, in the plane of the scan.
+pub(super) fn gate_positions(
+    map: &ScanMap,
+    cells: &[Cell],
+    model: &WakeModel,
+    wake: &Wake,
+) -> Vec<GatePosition> {
+    let carried_m_s = [mean_wind_m_s(map, cells, model, wake), 0.0, 0.0];
+    let mut gates = Vec::with_capacity(cells.len());
+    for cell in cells {
+        let (sine, cosine) = map.elevation_rad[cell.line].sin_cos();
+        let time_s = match map.has_times() {
+            true => map.time_s[cell.line],
+            false => 0.0,
+        };
+        let range_m = map.range_m[cell.gate];
+        let direction = [cosine, 0.0, sine];
+        gates.push(GatePosition::new(direction, range_m, time_s, carried_m_s));
+    }
+    gates
+}
+
+/// Lateral wind of a wake at the mean height of cells of a scan \[m/s\].
+fn mean_wind_m_s(map: &ScanMap, cells: &[Cell], model: &WakeModel, wake: &Wake) -> f64 {
+    let mut height_m = 0.0;
+    for cell in cells {
+        let range_m = map.range_m[cell.gate];
+        let elevation_rad = map.elevation_rad[cell.line];
+        height_m += model.position_m(range_m, elevation_rad).1;
+    }
+    let [.., wind_m_s, shear_per_s] = wake.to_array();
+    wind_m_s + shear_per_s * height_m / cells.len().max(1) as f64
 }
 
 /// A distance that no two gates exceed \[m\], at least 1 m.

@@ -4,10 +4,10 @@
 
 use ndarray::Array2;
 
-use crate::linalg::cholesky::{cholesky, forward_one};
+use crate::linalg::cholesky::{cholesky, forward, forward_one};
 
 /// Lower factor L of C = L L^T.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Whitening {
     pub(crate) lower: Array2<f64>,
 }
@@ -53,6 +53,19 @@ impl Whitening {
         rest
     }
 
+    /// L^-1 A L^-T of a symmetric matrix A, of which the lower triangle is read.
+    pub(crate) fn whitened_both_sides(&self, mut matrix: Array2<f64>) -> Array2<f64> {
+        for i in 0..matrix.nrows() {
+            for j in 0..i {
+                matrix[[j, i]] = matrix[[i, j]];
+            }
+        }
+        forward(self.lower.view(), &mut matrix);
+        let mut turned = matrix.reversed_axes().as_standard_layout().into_owned();
+        forward(self.lower.view(), &mut turned);
+        turned
+    }
+
     /// Replaces x by L^-1 x.
     pub(crate) fn whiten(&self, x: &mut [f64]) {
         // rows of a factor lie in one piece
@@ -93,6 +106,10 @@ mod tests {
                 .enumerate()
                 .all(|(i, x)| (x - f64::from(u8::from(i == 60))).abs() < 1e-12)
         );
+        // C itself becomes the unit matrix
+        let covariance = factor.lower.dot(&factor.lower.t());
+        let unit = factor.whitened_both_sides(covariance) - Array2::<f64>::eye(130);
+        assert!(unit.iter().all(|x| x.abs() < 1e-12));
         // L^T times the weights of a contrast is the pattern
         let pattern: Vec<f64> = (0..130).map(|i| f64::from(i % 11) - 5.0).collect();
         let weights = factor.contrast(&pattern);

@@ -16,6 +16,7 @@ use crate::error::{Error, length};
 use crate::linalg::dot;
 use crate::linalg::tridiagonal::eigenvalues_with_components;
 use crate::parallel::map_each;
+use crate::retrieval::Whitening;
 
 /// Columns of the mean are independent beyond this fraction of the largest one.
 pub(super) const RANK: f64 = 1e-4;
@@ -61,6 +62,8 @@ pub struct Block {
     heights_m: Vec<f64>,
     /// Columns of a mean that is no linear wind, of unit length \[m/s\].
     other_mean: Vec<Vec<f64>>,
+    /// Factor of the correlation of the noise; none of independent noise.
+    noise_factor: Option<Whitening>,
 }
 
 impl Block {
@@ -73,6 +76,7 @@ impl Block {
             noise_std_m_s: Vec::with_capacity(samples.len()),
             heights_m: Vec::with_capacity(samples.len()),
             other_mean: Vec::new(),
+            noise_factor: None,
         };
         let heights: f64 = samples.iter().map(GateSample::height_m).sum();
         let mean_m = heights / samples.len().max(1) as f64;
@@ -114,6 +118,25 @@ impl Block {
             velocity_m_s: residual_m_s,
             noise_std_m_s,
             other_mean,
+            noise_factor: None,
+        })
+    }
+
+    /// The same with the correlation of the noise, of which the lower triangle is read.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another order, [`Error::Linalg`] for a matrix that is not positive definite.
+    pub(crate) fn with_correlated_noise(self, correlation: Array2<f64>) -> Result<Self, Error> {
+        let order = correlation.nrows();
+        length("correlation of the noise", self.len(), order)?;
+        let factor = Whitening::new(correlation).ok_or(Error::Linalg {
+            what: "correlation of the noise",
+            order,
+            reason: "is not positive definite",
+        })?;
+        Ok(Self {
+            noise_factor: Some(factor),
+            ..self
         })
     }
 
@@ -163,15 +186,19 @@ impl Block {
         columns
     }
 
-    /// Velocities over the standard deviations of the noise.
+    /// Velocities with white noise of unit variance.
     fn whitened(&self) -> Vec<f64> {
         self.over_noise(&self.velocity_m_s)
     }
 
-    /// Numbers of the velocities over the standard deviations of the noise.
+    /// Numbers of the velocities, scaled so that the noise is white and has unit variance.
     fn over_noise(&self, numbers: &[f64]) -> Vec<f64> {
         let both = numbers.iter().zip(&self.noise_std_m_s);
-        both.map(|(number, std)| number / std).collect()
+        let mut scaled: Vec<f64> = both.map(|(number, std)| number / std).collect();
+        if let Some(factor) = &self.noise_factor {
+            factor.whiten(&mut scaled);
+        }
+        scaled
     }
 
     /// Positions and directions relative to the first gate, in steps of [`SAME_GEOMETRY`].
@@ -192,15 +219,20 @@ impl Block {
         key
     }
 
-    /// Covariance matrices of the velocities for a dissipation of 1 m²/s³ at each outer scale, over the standard deviations of the noise.
+    /// Covariance matrices of the velocities for a dissipation of 1 m²/s³ at each outer scale, scaled so that the noise is white and has
+    /// unit variance.
     pub(super) fn covariances(&self, covariance: &GateCovariance) -> Vec<Array2<f64>> {
-        let mut matrices = covariance.matrices(&self.gates);
-        for matrix in &mut matrices {
+        let mut scaled = Vec::with_capacity(covariance.len());
+        for mut matrix in covariance.matrices(&self.gates) {
             for ((i, j), value) in matrix.indexed_iter_mut() {
                 *value /= self.noise_std_m_s[i] * self.noise_std_m_s[j];
             }
+            scaled.push(match &self.noise_factor {
+                Some(factor) => factor.whitened_both_sides(matrix),
+                None => matrix,
+            });
         }
-        matrices
+        scaled
     }
 }
 

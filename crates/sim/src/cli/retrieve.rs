@@ -85,8 +85,11 @@ pub(super) struct RetrieveArgs {
     folder: FolderArgs,
 }
 
-/// Why turbulence is not in fits of estimates.
-const INDEPENDENT: &str = "what the estimator shows of a wake is fitted with independent errors; those of means may be shared";
+/// Why turbulence of a given length is not in fits of estimates.
+const INDEPENDENT: &str = "what the estimator shows of a wake is fitted with independent errors or, with --turbulence auto, in the turbulence of the \
+                           scan";
+/// Why turbulence is not in fits of signals.
+const STILL: &str = "the likelihood of signals is that of still air: leave out --method signals";
 
 /// Sampling of an instrument of which it is not known, Hz.
 const WIDE_HZ: f64 = 500e6;
@@ -125,16 +128,14 @@ impl RetrieveArgs {
             _ if self.motion != Movement::Auto && !scan.map.has_times() => {
                 ("motion", "its lines have no times")
             }
-            Velocities::Estimates(_) if has_turbulence => ("turbulence", INDEPENDENT),
-            Velocities::LikelyEstimates(_) if is_of_scan => ("turbulence", INDEPENDENT),
-            Velocities::Means | Velocities::Unknown
-                if has_turbulence && self.secondary.is_some() =>
-            {
-                (
-                    "secondary",
-                    "of velocities that share turbulence a pair alone is fitted: leave out --turbulence",
-                )
+            _ if self.method == Method::Signals && has_turbulence => ("turbulence", STILL),
+            Velocities::Estimates(_) if has_turbulence && !is_of_scan => {
+                ("turbulence", INDEPENDENT)
             }
+            _ if has_turbulence && self.secondary.is_some() => (
+                "secondary",
+                "of velocities that share turbulence a pair alone is fitted: leave out --turbulence",
+            ),
             _ => return Ok(()),
         };
         Err(refusal_of_idle(&scan.path, name, reason))
@@ -469,7 +470,8 @@ fn of_map(
         None => Velocities::Unknown,
     };
     args.refuse_idle_on(&scan, velocities)?;
-    if args.air.turbulence == Some(Turbulence::OfScan)
+    if own.is_none()
+        && args.air.turbulence == Some(Turbulence::OfScan)
         && let Some(text) = overlap_warning(&scan.map.range_m, &gate)
     {
         observer.warn(&format!("{}: {text}", scan.path.display()));

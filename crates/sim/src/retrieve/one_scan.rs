@@ -8,11 +8,11 @@ use super::table::{RetrievedScan, refused};
 use crate::io::scans::ReadScan;
 use crate::plan::instrument::Instrument;
 use crate::progress::Observer;
-use crate::scene::{RetrievalMethod as Method, Scene, SceneFile};
+use crate::scene::{RetrievalMethod as Method, RetrievalTurbulence, Scene, SceneFile};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use std::path::Path;
 use wakescope_estimate::retrieval::{
-    Gate, RetrievalOptions, ScanFit, Velocities, fit_scan, radial_velocity_method,
+    Gate, RetrievalOptions, ScanFit, Turbulence, Velocities, fit_scan, radial_velocity_method,
     without_implausible_vortices,
 };
 use wakescope_estimate::vortex_fit::{CorePrior, RangeKernel, Sharing, WakeModel};
@@ -139,6 +139,9 @@ pub fn options(scene: Option<&Scene>, gate: Gate, core_radius_m: Option<f64>) ->
         secondary: wanted.map(|wanted| wanted.secondary).unwrap_or_default(),
         ..RetrievalOptions::default()
     };
+    if wanted.is_some_and(|wanted| wanted.turbulence == RetrievalTurbulence::Auto) {
+        options.turbulence = Some(Turbulence::OfScan);
+    }
     if core_radius_m.is_some() {
         options.free.core_radius = Sharing::Fixed;
     }

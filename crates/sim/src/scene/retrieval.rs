@@ -21,6 +21,16 @@ keys! {
         Envelope = "envelope",
     }
 
+    /// Turbulence in the covariance of the velocities.
+    #[derive(Default)]
+    choice RetrievalTurbulence {
+        /// Independent errors.
+        #[default]
+        None = "none",
+        /// Isotropic turbulence, found in each scan.
+        Auto = "auto",
+    }
+
     /// Retrieval of vortices from each realisation, compared with the truth of the flow.
     table Retrieval {
         /// Retrieval methods; each is applied to every realisation.
@@ -32,6 +42,8 @@ keys! {
         core_radius_m: Option<f64> = None => 1e-3..=1e3,
         /// Whether secondary vortices are fitted beside a pair.
         secondary: Secondary = Secondary::Auto,
+        /// Turbulence in the covariance of the velocities of fits to maps.
+        turbulence: RetrievalTurbulence as omitted = RetrievalTurbulence::None,
         /// False-alarm rate per scan at which the maps are tested for a wake; no test if absent.
         false_alarm: Option<f64> = None => 1e-9..=0.5,
         /// The following aircraft; none if absent.
@@ -83,6 +95,9 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
             "absent where detector.noise = \"none\": nothing is by chance",
         );
     }
+    if r.turbulence == RetrievalTurbulence::Auto {
+        check_turbulence(r, c);
+    }
     let across = "absent but for scan.pattern.kind = \"rhi\" in the plane across the flight, where vortices are sought: with \
                   scan.lidar.velocity_m_s = [0.0, 0.0, 0.0], y_m = 0.0, and flight_azimuth_rad absent or a quarter turn before scan.azimuth_rad";
     c.require(scene.scan.is_across(), "retrieval", "a table", across);
@@ -102,6 +117,24 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
         let is_likely = scene.pulse.is_gaussian() && scene.detector.noise != NoiseModel::None;
         c.require(lacks(method) || is_likely, key, method.name(), allowed);
     }
+}
+
+/// What a scene may say of its retrievals beside turbulence that is found in each scan.
+fn check_turbulence(r: &Retrieval, c: &mut Checker<'_>) {
+    let key = "retrieval.turbulence";
+    let has = |method| r.methods.contains(&method);
+    let allowed = "\"none\" without retrieval.methods = [\"fit\"] or [\"envelope\"]: other methods know of no turbulence";
+    let has_fit = has(RetrievalMethod::Fit) || has(RetrievalMethod::Envelope);
+    c.require(
+        has_fit && !has(RetrievalMethod::Signals),
+        key,
+        "auto",
+        allowed,
+    );
+    let allowed = "\"none\" beside retrieval.secondary: in turbulence a pair alone is fitted";
+    c.require(r.secondary == Secondary::Auto, key, "auto", allowed);
+    let allowed = "\"none\" beside retrieval.false_alarm, whose test for a wake is that of still air; see wakescope detect --turbulence auto";
+    c.require(r.false_alarm.is_none(), key, "auto", allowed);
 }
 
 impl Scan {
@@ -131,6 +164,7 @@ mod tests {
     fn retrievals_are_held_to_their_limits_and_need_vortices() {
         for text in [
             "[retrieval]\nsecondary = \"never\"\n",
+            "[retrieval]\nturbulence = \"auto\"\nmethods = [\"rv\", \"envelope\"]\n",
             "[retrieval]\nmethods = [\"fit\", \"signals\", \"rv\", \"envelope\"]\nfalse_alarm = 0.01\n",
             "[retrieval]\n[scan]\nazimuth_rad = 1.0\n[scan.head]\nsweeps = 3\ndirection = \"alternate\"\n",
             "[retrieval]\n[scan]\nazimuth_rad = 2.0\n[scan.lidar]\nflight_azimuth_rad = 0.42920367320510344\n",
@@ -160,6 +194,22 @@ mod tests {
                 "retrieval.methods",
             ),
             ("[retrieval]\nfalse_alarm = 0.9\n", "retrieval.false_alarm"),
+            (
+                "[retrieval]\nturbulence = \"auto\"\nmethods = [\"fit\", \"signals\"]\n",
+                "retrieval.turbulence",
+            ),
+            (
+                "[retrieval]\nturbulence = \"auto\"\nmethods = [\"rv\"]\n",
+                "retrieval.turbulence",
+            ),
+            (
+                "[retrieval]\nturbulence = \"auto\"\nsecondary = \"always\"\n",
+                "retrieval.turbulence",
+            ),
+            (
+                "[retrieval]\nturbulence = \"auto\"\nfalse_alarm = 0.01\n",
+                "retrieval.turbulence",
+            ),
             (
                 "[retrieval]\ncore_radius_m = 0.0\n",
                 "retrieval.core_radius_m",

@@ -220,6 +220,11 @@ const KINDS: &[Kind] = &[
             "profile",
         ],
     ),
+    some(
+        "retrieve",
+        "o/map.nc --turbulence auto --out out",
+        &["secondary"],
+    ),
     some("retrieve", "table.csv --gate-std 9 --out out", OF_ESTIMATOR),
     some("retrieve", "table.csv --gate-std 0 --out out", OF_ESTIMATOR),
     some(

@@ -6,6 +6,7 @@
 use ndarray::{Array2, ArrayView2, Axis};
 
 use crate::vortex_fit::VelocityMap;
+use crate::vortex_fit::map_fit::cells::Cell;
 
 /// Fewer velocities than this are not thinned: they would leave too few for the scale of the residuals.
 const NEEDED: usize = 500;
@@ -79,6 +80,16 @@ impl Coarse {
         }
     }
 
+    /// The same cells, numbered as in the whole map.
+    pub(crate) fn in_whole_map(&self, cells: &[Cell]) -> Vec<Cell> {
+        let mut whole = cells.to_vec();
+        for cell in &mut whole {
+            cell.line = self.lines[cell.line];
+            cell.gate = self.gates[cell.gate];
+        }
+        whole
+    }
+
     /// Numbers of these places at all places of a map of that size: linear between, and beyond the outermost as there. Numbers
     /// that are not finite are left out.
     pub(crate) fn everywhere(&self, some: &Array2<f64>, size: (usize, usize)) -> Array2<f64> {
@@ -106,7 +117,7 @@ fn selected(all: ArrayView2<'_, f64>, lines: &[usize], gates: &[usize]) -> Array
 }
 
 /// At most every `step`th of `count` places, about the middle: from one to the next, and which.
-fn every(count: usize, step: f64) -> (usize, Vec<usize>) {
+pub(crate) fn every(count: usize, step: f64) -> (usize, Vec<usize>) {
     // also 1 for NaN
     let step = (step.max(1.0) as usize).min(count.max(1));
     (

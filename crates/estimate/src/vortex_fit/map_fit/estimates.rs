@@ -23,7 +23,7 @@ use crate::vortex_fit::tolerances::{
 use crate::vortex_fit::top::distinct;
 use crate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, SecondaryVortices,
-    Sharing, VelocityMap, Wake, WakeModel,
+    Sharing, VelocityMap, Vortex, Wake, WakeModel,
 };
 
 /// The least core radius over a region's radius, or over the distance of lines.
@@ -85,7 +85,7 @@ pub fn fit_map_of_estimator(
         Some(thinned) => thinned.ends_of_means(&guesses, &thinned.prepared.kernel),
         None => full.ends_of_means(&guesses, &full.prepared.kernel.coarser(2)),
     };
-    let for_slopes = full.coarse(LINES_OVER_RADIUS[1]);
+    let for_slopes = full.coarse_for_slopes();
     let full = full.with_slopes_at(for_slopes.as_ref())?;
     let best = match full.best_about(&about, thinned.as_ref()) {
         Err(Error::NotConverged { .. }) => full.best_about(&guesses, thinned.as_ref()),
@@ -109,7 +109,7 @@ pub fn refine_map_fit_of_estimator(
 ) -> Result<MapFit, Error> {
     map.validate()?;
     let full = EstimatorPrediction::new(map, model, response, options, 1.0)?;
-    let for_slopes = full.coarse(LINES_OVER_RADIUS[1]);
+    let for_slopes = full.coarse_for_slopes();
     full.with_slopes_at(for_slopes.as_ref())?
         .refined(guess, ESTIMATES)
 }
@@ -170,10 +170,7 @@ pub fn with_local_circulations(
     pair.wake.validate()?;
     let vortices = [pair.wake.left, pair.wake.right];
     let local = [0, 1].map(|side| {
-        let near = Coarse::near(map, |line, gate| {
-            vortices[side].away_m(model.position_m(map.range_m[gate], map.elevation_rad[line]))
-                < REACH_M
-        });
+        let near = near_vortex(map, model, &vortices[side]);
         let shown = EstimatorPrediction::new(&near.map(), model, response, options, 1.0).ok()?;
         shown
             .setting()
@@ -182,10 +179,18 @@ pub fn with_local_circulations(
     Ok(joined(pair, &local))
 }
 
+/// What is near a vortex.
+pub(crate) fn near_vortex(map: &VelocityMap<'_>, model: &WakeModel, vortex: &Vortex) -> Coarse {
+    Coarse::near(map, |line, gate| {
+        let place_m = model.position_m(map.range_m[gate], map.elevation_rad[line]);
+        vortex.away_m(place_m) < REACH_M
+    })
+}
+
 /// A map, and what an estimator shows at its places.
-struct EstimatorPrediction<'a, 'm> {
-    map: VelocityMap<'m>,
-    prepared: Prepared<'a>,
+pub(crate) struct EstimatorPrediction<'a, 'm> {
+    pub(crate) map: VelocityMap<'m>,
+    pub(crate) prepared: Prepared<'a>,
     /// Some places at which slopes are taken, if not at all of them; between they are linear.
     slopes_at: Option<(&'a Coarse, Prepared<'a>)>,
     options: MapFitOptions,
@@ -195,7 +200,7 @@ struct EstimatorPrediction<'a, 'm> {
 
 impl<'a, 'm: 'a> EstimatorPrediction<'a, 'm> {
     /// With nodes of the air `coarser` times as far apart as need be.
-    fn new(
+    pub(crate) fn new(
         map: &VelocityMap<'m>,
         model: &'a WakeModel,
         response: &'a EstimatorResponse<'a>,
@@ -214,6 +219,11 @@ impl<'a, 'm: 'a> EstimatorPrediction<'a, 'm> {
             options: *options,
             least_core_m,
         })
+    }
+
+    /// The places at which slopes are taken.
+    pub(crate) fn coarse_for_slopes(&self) -> Option<Coarse> {
+        self.coarse(LINES_OVER_RADIUS[1])
     }
 
     /// The places that tell nearly all of the map.
@@ -246,14 +256,14 @@ impl<'a, 'm: 'a> EstimatorPrediction<'a, 'm> {
     }
 
     /// The same with slopes at some places.
-    fn with_slopes_at(self, places: Option<&'a Coarse>) -> Result<Self, Error> {
+    pub(crate) fn with_slopes_at(self, places: Option<&'a Coarse>) -> Result<Self, Error> {
         let slopes_at = places
             .map(|places| Ok((places, self.at(places)?.prepared)))
             .transpose()?;
         Ok(Self { slopes_at, ..self })
     }
 
-    fn setting(&self) -> Setting<'_, 'm> {
+    pub(crate) fn setting(&self) -> Setting<'_, 'm> {
         let Self {
             map,
             prepared: Prepared { model, kernel, .. },
@@ -436,7 +446,7 @@ mod tests {
             standard_deviation_m_s: None,
         };
         let whole = EstimatorPrediction::new(&map, &model, &response, &options, 1.0).unwrap();
-        let coarse = whole.coarse(LINES_OVER_RADIUS[1]).unwrap();
+        let coarse = whole.coarse_for_slopes().unwrap();
         assert!(2 * coarse.map().velocity_m_s.len() <= velocity_m_s.len());
         let groups = options.free.groups();
         let all = whole.predict(&wake.to_array(), &groups).slopes;

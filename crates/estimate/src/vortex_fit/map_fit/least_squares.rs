@@ -48,7 +48,7 @@ pub(crate) struct Rows {
 
 /// Where the covariance of the gradient comes from.
 #[derive(Clone, Copy)]
-pub(crate) enum Scores {
+pub(crate) enum Scores<'c> {
     /// From the stated deviations, for normal residuals.
     Stated,
     /// From the correlation of the residuals with those of neighbours, over at most so many lines: right where windows and regions are shared, as
@@ -57,6 +57,8 @@ pub(crate) enum Scores {
     /// From white noise and a part that decays with the distance, fitted to residuals over blocks of so many lines and gates: right where turbulence
     /// is what they have in common.
     Decaying { blocks: (usize, usize) },
+    /// From a covariance of the velocities of two cells, by their numbers, over their deviations.
+    Correlated(&'c (dyn Fn(usize, usize) -> f64 + Sync)),
 }
 
 impl LeastSquares<'_> {
@@ -258,7 +260,7 @@ impl LeastSquares<'_> {
         &self,
         p: &[f64],
         groups: &'g [Vec<usize>],
-        from: Scores,
+        from: Scores<'_>,
     ) -> Result<Uncertainty<'g>, Error> {
         let rows = self.rows(p, groups);
         let losses: Vec<_> = rows.residuals.iter().map(|r| self.loss.at(*r)).collect();
@@ -295,6 +297,7 @@ impl LeastSquares<'_> {
         let (scores, alike) = match from {
             Scores::OfNeighbours { lines } => of_neighbours(all, &inverse(CURVATURE, &a)?, lines),
             Scores::Decaying { blocks } => decaying(all, blocks),
+            Scores::Correlated(covariance) => (of_pairs(&curved, &rows.slopes, covariance), 1.0),
             Scores::Stated => (a.clone(), 1.0),
         };
         Ok(Uncertainty {
@@ -306,7 +309,40 @@ impl LeastSquares<'_> {
     }
 }
 
-const CURVATURE: &str = "curvature of the fit";
+/// Covariance of the gradient of a fit from those of pairs of cells: sum over i, k of c(i, k) g_i g_k^T, g the slopes times the weights.
+fn of_pairs(
+    weights: &[f64],
+    slopes: &[Vec<f64>],
+    covariance: &(dyn Fn(usize, usize) -> f64 + Sync),
+) -> Array2<f64> {
+    let mut columns = Vec::with_capacity(slopes.len());
+    for slope in slopes {
+        columns.push(scaled(weights, slope));
+    }
+    let sums = map_each(weights.len(), |i| {
+        let mut sums = vec![0.0; columns.len()];
+        for k in 0..i {
+            let shared = covariance(i, k);
+            for (sum, column) in sums.iter_mut().zip(&columns) {
+                *sum += shared * column[k];
+            }
+        }
+        let own = 0.5 * covariance(i, i);
+        for (sum, column) in sums.iter_mut().zip(&columns) {
+            *sum += own * column[i];
+        }
+        sums
+    });
+    let mut half = Array2::<f64>::zeros((columns.len(), columns.len()));
+    for (i, sums) in sums.iter().enumerate() {
+        for ((a, b), value) in half.indexed_iter_mut() {
+            *value += columns[a][i] * sums[b];
+        }
+    }
+    &half + &half.t()
+}
+
+pub(crate) const CURVATURE: &str = "curvature of the fit";
 
 /// What a map tells of the free numbers of a fit: the curvature A of its cost and the covariance B of the gradient.
 pub(crate) struct Uncertainty<'g> {
@@ -358,4 +394,31 @@ fn inflation(loss: Loss) -> f64 {
 fn add_square(a: &mut Array2<f64>, v: &[f64], weight: f64) {
     a.indexed_iter_mut()
         .for_each(|((i, j), a)| *a += weight * v[i] * v[j]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::of_pairs;
+
+    /// Five cells whose covariance falls with their distance, two free numbers, against the sum over all pairs.
+    #[test]
+    fn gradients_have_the_covariance_of_all_pairs_of_cells() {
+        let weights = [1.0, 0.5, 0.2, 1.0, 0.8];
+        let slopes = [
+            vec![1.0, -2.0, 0.5, 3.0, 0.0],
+            vec![0.3, 0.1, -1.0, 2.0, 4.0],
+        ];
+        let covariance = |i: usize, k: usize| (-0.3 * i.abs_diff(k) as f64).exp() + 0.1;
+        let found = of_pairs(&weights, &slopes, &covariance);
+        for ((a, b), value) in found.indexed_iter() {
+            let mut sum = 0.0;
+            for i in 0..5 {
+                for k in 0..5 {
+                    let own = weights[i] * slopes[a][i];
+                    sum += own * covariance(i, k) * weights[k] * slopes[b][k];
+                }
+            }
+            assert!((value - sum).abs() < 1e-12, "{a} {b}: {value} {sum}");
+        }
+    }
 }

@@ -427,7 +427,7 @@ fn learnt_deviations(
 }
 
 /// Raises free core radii below the least one, which are kept from then on; those of the other vortex stay free.
-fn keep_small_cores(p: &mut [f64], groups: &mut Vec<Vec<usize>>, least_m: f64) {
+pub(crate) fn keep_small_cores(p: &mut [f64], groups: &mut Vec<Vec<usize>>, least_m: f64) {
     groups.retain(|group| {
         let is_small = is_core(group) && group.iter().any(|&place| p[place] < least_m);
         if is_small {
