@@ -404,6 +404,40 @@ def ap1():
     return found
 
 
+def of_pairs(method):
+    """Scans of a method in turbulence: errors and standard errors of their vortices, by level and dissipation rate."""
+    cases = {}
+    for row in rows("fig22"):
+        if row["method"] == method and row["gamma_error_m2_s"] == row["gamma_error_m2_s"]:
+            scans = cases.setdefault((row["snr_db"], row["dissipation_m2_s3"]), {})
+            scans.setdefault(row["scan"], []).append((row["gamma_error_m2_s"], row["gamma_std_m2_s"]))
+    return {case: list(scans.values()) for case, scans in cases.items()}
+
+
+def rms_of_pairs(scans, number, without):
+    squares = [vortex[number] ** 2 for i, scan in enumerate(scans) if i != without for vortex in scan]
+    return math.sqrt(sum(squares) / len(squares))
+
+
+def ct1():
+    return [
+        words(estimate(len(s), lambda b, s=s: rms_of_pairs(s, 1, b) / rms_of_pairs(s, 0, b)))
+        for s in of_pairs("fit, turbulence of the scan").values()
+    ]
+
+
+def ct2():
+    found = {}
+    for row in rows("fig22"):
+        if row["method"] == "detect":
+            found.setdefault(row["snr_db"], []).append((row["detected_m2_s"], row["detected_error_m2_s"]))
+    parts = []
+    for (weak, weak_error), *_, (strong, strong_error) in found.values():
+        ratio = strong / weak
+        parts.append(words((ratio, ratio * math.hypot(weak_error / weak, strong_error / strong))))
+    return parts
+
+
 def of_scans(number):
     """A number of the scans of each dissipation rate, with its standard error from leaving out one scan at a time."""
     of_rate = {}
@@ -428,7 +462,7 @@ CLAIMS = {
     "F17i": lambda: retrieved("simulated wake, tau = 2.5", "fit"), "F17j": lambda: retrieved("simulated wake, tau = 4", "fit"),
     "F18a": lambda: over_bound(0.0, 15.0), "F18b": lambda: over_bound(-5.0, 20.0), "F18c": lambda: bad(20), "F18d": lambda: bad(60),
     "F16b": f16b, "F19a": f19a,
-    "CP1": cp1, "CP2": cp2, "CP3": cp3, "CP4": cp4, "CP5": cp5, "CP6": cp6, "AP1": ap1, "KA1": ka1, "KA2": ka2,
+    "CP1": cp1, "CP2": cp2, "CP3": cp3, "CP4": cp4, "CP5": cp5, "CP6": cp6, "AP1": ap1, "CT1": ct1, "CT2": ct2, "KA1": ka1, "KA2": ka2,
 }  # fmt: skip
 MEASURED = {row["id"]: row["measured"] for row in rows("claims")}
 

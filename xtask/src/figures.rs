@@ -21,6 +21,7 @@ mod fig17;
 pub(crate) mod fig17_flows;
 mod fig18;
 mod fig19;
+mod fig22;
 mod fig23;
 mod fig25;
 mod fig26;
@@ -149,7 +150,7 @@ const fn figure(
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 23] = [
+pub(crate) const ALL: [Figure; 24] = [
     figure(
         "fig01",
         1,
@@ -259,6 +260,7 @@ pub(crate) const ALL: [Figure; 23] = [
     )
     .with_row(0, 3),
     figure("fig19", 19, "Detection of wakes", 10.5, fig19::make),
+    figure("fig22", 22, "Circulation in turbulence", 12.0, fig22::make),
     figure(
         "fig23",
         23,
