@@ -7,7 +7,8 @@
 //! A is the curvature of the robust cost, G the slopes times the second derivatives of the loss, R the covariance of the noise, which gates whose
 //! pulses and windows overlap and lines of one region share, and the rest as in [`scan_turbulence`](super::scan_turbulence). The fit is that to
 //! independent velocities: peaks jump between the spectra of neighbouring places where the air varies, which a fit to differences of neighbours, as
-//! generalised least squares are, would take for wakes.
+//! generalised least squares are, would take for wakes. Turbulence that does not stand out of the noise is added to the covariance that the fit has
+//! without it.
 //! Check: circulations in turbulence through signals, in the tests across crates.
 
 use ndarray::Array2;
