@@ -96,6 +96,7 @@ def train(scans, chosen, validation):
 
 
 def main(folder, out):
+    Path(out).mkdir(parents=True, exist_ok=True)
     print(f"jax {jax.__version__}, equinox {eqx.__version__}, optax {optax.__version__}, seed {SEED}")
     scans = data.read(folder, [data.TRAIN])
     validation = data.read(folder, [data.VALIDATION])

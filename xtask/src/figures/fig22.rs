@@ -262,7 +262,7 @@ impl Scans<'_> {
         }
     }
 
-    /// What the test for a wake detects in the turbulence of one scan, from so many empty scans.
+    /// What the test for a wake detects in the turbulence of one scan; `empty_scans` are drawn for its threshold.
     fn detected(&self, empty_scans: usize) -> Result<Detected, Failure> {
         let mut scene = self.scene(TESTED)?;
         scene.retrieval = None;

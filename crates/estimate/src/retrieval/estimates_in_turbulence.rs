@@ -6,8 +6,8 @@
 //!
 //! A is the curvature of the robust cost, G the slopes times the second derivatives of the loss, R the covariance of the noise, which gates whose
 //! pulses and windows overlap and lines of one region share, and the rest as in [`scan_turbulence`](super::scan_turbulence). The fit is that to
-//! independent velocities: peaks jump between the spectra of neighbouring places where the air varies, which a fit to differences of neighbours, as
-//! generalised least squares are, would take for wakes. Turbulence that does not stand out of the noise is added to the covariance that the fit has
+//! independent velocities: generalised least squares, which weigh differences of neighbours most, were tried and had no smaller errors in strong
+//! turbulence, probably because peaks jump there from place to place. Turbulence that does not stand out of the noise is added to the covariance that the fit has
 //! without it.
 //! Check: circulations in turbulence through signals, in the tests across crates.
 
@@ -58,8 +58,8 @@ pub(super) struct Estimates<'a, 'm> {
 
 impl<'a> Estimates<'a, '_> {
     /// A fit to independent velocities in the turbulence beside its wake; nothing where velocities are too few to tell it from noise. Turbulence that
-    /// stands out of the noise gives the covariance, and each circulation is that of what is near its vortex, in a wind of its own, where that is
-    /// the surer one. Other turbulence is added to the covariance of the fit.
+    /// stands out of the noise gives the covariance, and each circulation is that of what is near its vortex, in a wind of its own, where that has
+    /// the smaller variance. Other turbulence is added to the covariance of the fit.
     ///
     /// # Errors
     /// [`Error::Linalg`] if a free parameter does not show in the map; [`Error::OutOfRange`] for impossible input.
@@ -102,7 +102,7 @@ impl<'a> Estimates<'a, '_> {
         for side in 0..CIRCULATIONS.len() {
             let of_pair = (&groups[..], &in_all);
             if let Some(local) = self.nearby(&fit.wake, side, air, of_pair) {
-                turbulent.take_if_surer(side, local);
+                turbulent.take_if_less_uncertain(side, local);
             }
         }
         Ok(Some(turbulent))
@@ -196,7 +196,7 @@ impl<'a> Estimates<'a, '_> {
 
 impl TurbulentFit {
     /// Takes a circulation \[m²/s\] with its variance if that is less than that of the pair; correlations stay.
-    fn take_if_surer(&mut self, side: usize, (circulation_m2_s, variance): (f64, f64)) {
+    fn take_if_less_uncertain(&mut self, side: usize, (circulation_m2_s, variance): (f64, f64)) {
         let own = CIRCULATIONS[side] as usize;
         let covariance = &mut self.fit.covariance;
         let of_pair = covariance[[own, own]];

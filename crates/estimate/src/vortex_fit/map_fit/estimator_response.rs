@@ -333,8 +333,8 @@ impl Prepared<'_> {
         }
     }
 
-    /// Correlation of the noise of two gates in uniform wind: exp(-d²/(4 w²)), the square of the correlation of their speckle. Peaks of spectra have
-    /// it with w = 0.84 widths of a gate, measured at 10 dB.
+    /// Correlation of the noise of two gates in uniform wind: exp(-d²/(4 w²)), the square of the correlation of their speckle, with w = 0.84 widths of
+    /// a gate, as peaks of spectra had it at 10 dB with the default pulse and window.
     pub(crate) fn noise_correlation_of_gates(&self, [a, b]: [usize; 2]) -> f64 {
         let width_m = SPECKLE_OVER_GATE * self.kernel.width_m();
         let apart = (self.range_m[a] - self.range_m[b]) / width_m;
@@ -512,6 +512,37 @@ mod tests {
     ) -> EstimatorResponse<'a> {
         let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
         EstimatorResponse::new(statistic, estimator, &sampling(), &pulse, noise, radius_m).unwrap()
+    }
+
+    /// Regions of one line share no noise, regions of all lines share all of it.
+    #[test]
+    fn noise_is_shared_by_regions_with_common_lines_and_by_close_gates() {
+        let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
+        let moment = FirstMoment::new(
+            &sampling(),
+            SignalKind::Real,
+            &unweighted_lags(64),
+            1024,
+            3.5,
+        )
+        .unwrap();
+        let model = WakeModel::default();
+        for (radius_m, shared) in [(0.0, 0.0), (100.0, 1.0)] {
+            let shown = response(&statistic, &moment, (Noise::White, 2.0), radius_m);
+            let prepared = shown
+                .prepared(&model, (&LINES_RAD, &RANGES_M), 1.0)
+                .unwrap();
+            let of_lines = prepared.noise_correlation_of_lines([[0, 1], [1, 1]]);
+            // shares of lines fall a little with their distance
+            assert!((of_lines - shared).abs() < 1e-6, "{radius_m}: {of_lines}");
+            let own = prepared.noise_correlation_of_lines([[1, 1], [1, 1]]);
+            assert!((own - 1.0).abs() < 1e-12, "{radius_m}: {own}");
+            assert_eq!(prepared.noise_correlation_of_gates([1, 1]), 1.0);
+            let apart = (RANGES_M[1] - RANGES_M[0]) / prepared.kernel.width_m();
+            let of_gates = prepared.noise_correlation_of_gates([0, 1]);
+            let expected = (-apart * apart / (4.0 * 0.84 * 0.84)).exp();
+            assert!((of_gates - expected).abs() < 1e-12, "{of_gates} {expected}");
+        }
     }
 
     #[test]
