@@ -31,7 +31,7 @@ def test_the_pair_of_each_scan_is_found(folder, name):
     numpy.testing.assert_allclose(found.gamma_5_15_m2_s, 358.8, atol=5.0)
 
 
-@pytest.mark.parametrize("name", ["samples_of_a_byte.npy", "samples_with_an_offset.nc"])
+@pytest.mark.parametrize("name", ["samples_of_a_byte.npy", "samples_of_twelve_bits.npy", "samples_with_an_offset.nc"])
 def test_samples_have_the_velocity_of_the_air(folder, name):
     scan = {"elevation_min_rad": 0.06, "elevation_max_rad": 0.12, "elevation_step_rad": 0.01, "range_min_m": 320.0, "range_max_m": 480.0}
     keys = {f"scan.{key}": value for key, value in scan.items()} | {"scan.pulses_per_line": 4, "scan.realisations": 1}

@@ -170,6 +170,29 @@ def angles_with_a_gap(path):
     scan.write(path)
 
 
+def gates_before_rays(path):
+    """Gates run slower than rays, in a dataset with a dimension of length 1, as xarray turns it."""
+    Scan().dataset().transpose("range", "time").expand_dims("sweep").to_netcdf(path, format="NETCDF3_64BIT")
+
+
+def ranges_of_the_root(path):
+    """A sweep in a group of a group, beside one without velocities; the ranges are in the root."""
+    with netCDF4.Dataset(path, "w") as file:
+        file.createDimension("range", len(RANGE_M))
+        scans = file.createGroup("scans")
+        for sweep in ("sweep_0", "sweep_1"):
+            group = scans.createGroup(sweep)
+            group.createDimension("time", len(ELEVATION_DEG))
+            for name, (dims, kind, values, attributes) in Scan().variables.items():
+                if name == "range" and sweep == "sweep_1":
+                    continue
+                place = file if name == "range" else group
+                if name != "VEL" or sweep == "sweep_1":
+                    variable = place.createVariable(name, kind, tuple(dims.split()), zlib=True)
+                    variable.setncatts(attributes)
+                    variable[...] = values
+
+
 def table_of_savetxt(path):
     rows = [(r, e, v) for e, row in zip(ELEVATION_DEG, velocity()) for r, v in zip(RANGE_M, row)]
     np.savetxt(path, rows, fmt="%.2f", header="range_m elevation_deg velocity_m_s")
@@ -249,6 +272,13 @@ def samples_of_a_byte(path):
     np.save(path, np.round(128 + 127 * parts).astype("u1"))
 
 
+def samples_of_twelve_bits(path):
+    """In phase and quadrature from 0 to 4095 in 16 bits without sign, whose middle code is none of theirs."""
+    signal = echoes(True)
+    parts = np.stack([signal.real, signal.imag], axis=-1)
+    np.save(path, np.round(2048 + 2000 * parts).astype("<u2"))
+
+
 def samples_with_an_offset(path):
     """Currents in 16 bits with sign whose zero is the code 900, in NetCDF-4."""
     codes = np.round(900 + 4000 * echoes(False).real).astype("i2")
@@ -269,11 +299,14 @@ FILES = {
     "dimensions_called_as_variables.nc": dimensions_called_as_variables,
     "ranges_of_each_ray.nc": ranges_of_each_ray,
     "angles_with_a_gap.nc": angles_with_a_gap,
+    "gates_before_rays.nc": gates_before_rays,
+    "ranges_of_the_root.nc": ranges_of_the_root,
     "table_of_savetxt.csv": table_of_savetxt,
     "table_of_a_spreadsheet.csv": table_of_a_spreadsheet,
     "fields_of_cm1.nc": fields_of_cm1,
     "fields_of_wrf.nc": fields_of_wrf,
     "samples_of_a_byte.npy": samples_of_a_byte,
+    "samples_of_twelve_bits.npy": samples_of_twelve_bits,
     "samples_with_an_offset.nc": samples_with_an_offset,
 }
 

@@ -1,9 +1,11 @@
-//! Tables of texts from CSV: comment lines begin with `#`, the first other line is the header; quotes as in RFC 4180.
+//! Tables of texts from CSV: comment lines begin with `#`, `%`, `!` or `//`, the first other line is the header; quotes as in RFC 4180.
 //!
 //! Tables of other programs may have a header that is the last comment before a first line of numbers (`numpy.savetxt`), cells
-//! with semicolons, tabs or blanks between them, decimal commas beside separators that are none, and blanks around cells.
+//! with semicolons, tabs, bars or blanks between them, decimal commas beside separators that are none, blanks around cells, the header
+//! again where files were joined, and empty cells behind the last column.
 //! Check: what the writer of tables makes of any text comes back; one table in each of these forms.
 
+use super::netcdf_input::quoted;
 use super::{Provenance, text_file};
 use crate::Error;
 use std::path::Path;
@@ -50,23 +52,26 @@ impl TextTable {
                 .next()
                 .ok_or("no header: the first line that is not a comment names the columns")?,
         };
+        let as_written = header.clone();
         for name in &mut header {
             *name = name.trim().to_owned();
         }
         let mut rows = Vec::new();
-        for row in records {
+        for mut row in records {
+            if row == as_written {
+                continue;
+            }
+            while row.len() > header.len() && row.last().is_some_and(|cell| cell.trim().is_empty())
+            {
+                row.pop();
+            }
             if row.len() != header.len() {
-                let found = row.len();
-                let wanted = header.len();
-                return Err(format!(
-                    "row {} has {found} cells, the header {wanted}",
-                    rows.len() + 1
-                ));
+                return Err(uneven(&row, &header, rows.len() + 1));
             }
             rows.push(row);
         }
         let mut comment = String::new();
-        for line in text.lines().map_while(|line| line.strip_prefix('#')) {
+        for line in text.lines().map_while(comment_of) {
             comment += line.trim_end();
             comment.push('\n');
         }
@@ -118,6 +123,26 @@ impl TextTable {
     }
 }
 
+/// What is said of a row with another number of cells than the header.
+fn uneven(row: &[String], header: &[String], number: usize) -> String {
+    let found = row.len();
+    let wanted = header.len();
+    let said = format!("row {number} has {found} cells, the header {wanted}");
+    match header {
+        [only] => format!(
+            "{said} ({}): the first line that is no comment names the columns, and comments begin with #",
+            quoted(only)
+        ),
+        _ => said,
+    }
+}
+
+/// What follows the sign of a comment line.
+fn comment_of(line: &str) -> Option<&str> {
+    let signs = ["#", "%", "!", "//"];
+    signs.iter().find_map(|sign| line.strip_prefix(sign))
+}
+
 /// Whether all cells are numbers, with a decimal point or comma.
 fn are_numbers(cells: &[String]) -> bool {
     cells
@@ -129,10 +154,10 @@ fn are_numbers(cells: &[String]) -> bool {
 fn separator(text: &str) -> char {
     let mut lines = text
         .lines()
-        .filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
+        .filter(|line| !line.trim().is_empty() && comment_of(line).is_none());
     let first = lines.next().unwrap_or_default();
     let unquoted: String = first.split('"').step_by(2).collect();
-    for separator in [';', '\t'] {
+    for separator in [';', '\t', '|'] {
         if unquoted.contains(separator) {
             return separator;
         }
@@ -154,7 +179,7 @@ fn divides(separator: char, c: char) -> bool {
 
 /// The header of a table whose first line are numbers: the last comment before it.
 fn commented_header(text: &str, separator: char, count: usize) -> Result<Vec<String>, String> {
-    let comments = text.lines().map_while(|line| line.strip_prefix('#'));
+    let comments = text.lines().map_while(comment_of);
     let last = comments.last().unwrap_or_default().trim();
     let names = records(last, separator).next().unwrap_or_default();
     match names.len() == count {
@@ -170,8 +195,12 @@ fn records(text: &str, separator: char) -> impl Iterator<Item = Vec<String>> + '
     let mut chars = text.chars().peekable();
     std::iter::from_fn(move || {
         loop {
-            match chars.peek()? {
-                '#' => while chars.next().is_some_and(|c| c != '\n') {},
+            let first = *chars.peek()?;
+            match first {
+                '#' | '%' | '!' => while chars.next().is_some_and(|c| c != '\n') {},
+                '/' if chars.clone().nth(1) == Some('/') => {
+                    while chars.next().is_some_and(|c| c != '\n') {}
+                }
                 '\n' | '\r' => drop(chars.next()),
                 ' ' if separator == ' ' => drop(chars.next()),
                 _ => break,
@@ -255,6 +284,10 @@ mod tests {
             "# a b\n1.5 2.5\n3.0 4.0\n",
             "a  b\n 1.5   2.5 \n 3.0   4.0\n",
             "A,B\r1.5,2.5\r3.0,4.0\r",
+            "% of Octave\n%\na,b\n1.5,2.5\n3.0,4.0\n",
+            "// a b\n1.5 2.5\n3.0 4.0\n",
+            "! note\na|b\n1.5|2.5\n3.0|4.0\n",
+            "a,b\n1.5,2.5,\na,b\n3.0,4.0,\n",
         ] {
             let table = TextTable::parse(text).expect(text);
             let a = table.column("a").expect(text);
@@ -263,6 +296,11 @@ mod tests {
             assert_eq!(numbers, [[1.5, 2.5], [3.0, 4.0]], "{text}");
             assert_eq!(table.rows.len(), 2, "{text}");
         }
+        let refused = TextTable::parse("Scan of 2024\na,b\n1,2\n").unwrap_err();
+        assert!(
+            refused.contains("the header 1 (\"Scan of 2024\")"),
+            "{refused}"
+        );
         let refused = TextTable::parse("# three, of, these\n1.0,2.0\n").unwrap_err();
         assert!(refused.contains("first line has 2 numbers"), "{refused}");
         assert!(

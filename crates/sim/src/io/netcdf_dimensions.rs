@@ -8,6 +8,9 @@ use super::netcdf_input::{NetcdfFile, own_name, presentable};
 use super::units::Quantity;
 use ndarray::{ArrayD, Axis};
 
+/// Velocities that no air has, m/s.
+const FASTEST_M_S: f64 = 500.0;
+
 /// What a dimension is for: its name here, its letter in the attribute `axis`, and other names for it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Role {
@@ -222,7 +225,8 @@ impl NetcdfFile {
             .collect())
     }
 
-    /// Velocities in m/s with their dimensions in this order, as [`Self::ordered`].
+    /// Velocities in m/s with their dimensions in this order, as [`Self::ordered`]; NaN where one is as large as no wind, as fill values
+    /// are that no attribute names.
     ///
     /// # Errors
     /// As there; a unit that is no velocity.
@@ -237,6 +241,10 @@ impl NetcdfFile {
             .ordered(name, order, place)?
             .into_iter()
             .map(|value| value * unit_m_s)
+            .map(|value| match value.abs() < FASTEST_M_S {
+                true => value,
+                false => f64::NAN,
+            })
             .collect())
     }
 

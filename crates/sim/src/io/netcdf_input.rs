@@ -11,7 +11,8 @@ use ndarray::ArrayD;
 use netcdf_reader::masked::MaskParams;
 use netcdf_reader::unpack::{SignParams, UnpackParams};
 use netcdf_reader::{
-    NcAttrValue, NcAttribute, NcFile, NcFormat, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable,
+    NcAttrValue, NcAttribute, NcFile, NcFormat, NcGroup, NcSliceInfo, NcSliceInfoElem, NcType,
+    NcVariable,
 };
 #[cfg(feature = "netcdf4")]
 use netcdf_reader::{NcMetadataMode, NcOpenOptions};
@@ -38,6 +39,16 @@ const CONVERT: &str = "nccopy -k nc6 in.nc out.nc, or in xarray load_dataset(\"i
 /// What netCDF-4 puts before the name of a variable that is also that of a dimension along which it does not run.
 const NON_COORDINATE: &str = "_nc4_non_coord_";
 
+/// Variables that groups share with the root where they have none of their own.
+const OF_ALL_GROUPS: [&str; 6] = [
+    "range",
+    "distance",
+    "latitude",
+    "longitude",
+    "nyquist_velocity",
+    "pulse_width",
+];
+
 /// A NetCDF file, open, or a group of one.
 #[derive(Clone)]
 pub(crate) struct NetcdfFile {
@@ -48,6 +59,8 @@ pub(crate) struct NetcdfFile {
     /// Name of the group; empty for the root.
     group: String,
     pub(super) variables: Vec<NcVariable>,
+    /// Names of those among them that are of the root.
+    shared: Vec<&'static str>,
     /// Variables of the root.
     root: Arc<Vec<NcVariable>>,
     /// Attributes of the root.
@@ -83,6 +96,7 @@ pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
         file: Arc::new(file),
         bytes,
         group: String::new(),
+        shared: Vec::new(),
         root: Arc::new(variables.clone()),
         variables,
         attributes,
@@ -158,19 +172,19 @@ pub(crate) fn open_groups(
     has_needed: impl Fn(&NetcdfFile) -> bool,
 ) -> Result<Vec<NetcdfFile>, Error> {
     let root = open(path)?;
-    let groups = root
-        .file
-        .root_group()
-        .map_or(&[][..], |group| &group.groups);
     let mut found = vec![root.clone()];
-    for group in groups {
-        found.push(NetcdfFile {
-            group: group.name.clone(),
-            variables: group.variables.clone(),
-            ..root.clone()
-        });
+    if let Ok(group) = root.file.root_group() {
+        root.add_groups("", group, &mut found);
     }
     found.retain(has_needed);
+    for group in found.iter_mut().filter(|group| !group.group.is_empty()) {
+        for name in OF_ALL_GROUPS {
+            if let Some(shared) = root.variable(name).filter(|_| !group.has(name)) {
+                group.variables.push(shared.clone());
+                group.shared.push(name);
+            }
+        }
+    }
     if found.is_empty() {
         return Err(root.refuse(format!(
             "neither it nor one of its groups has a variable {needed}"
@@ -182,12 +196,15 @@ pub(crate) fn open_groups(
 impl NetcdfFile {
     /// An error of this file, or of its group.
     pub(crate) fn refuse(&self, reason: String) -> Error {
-        let reason = if self.group.is_empty() {
-            reason
-        } else {
-            format!("group {}: {reason}", self.group)
-        };
-        Error::input(&self.path, reason)
+        Error::input(&self.path, self.named(reason))
+    }
+
+    /// What is said of this group.
+    pub(crate) fn named(&self, reason: String) -> String {
+        match self.group.is_empty() {
+            true => reason,
+            false => format!("group {}: {reason}", self.group),
+        }
     }
 
     pub(super) fn variable(&self, name: &str) -> Option<&NcVariable> {
@@ -209,6 +226,19 @@ impl NetcdfFile {
     /// Lengths of the dimensions of a variable, slowest first.
     pub(crate) fn shape(&self, name: &str) -> Option<Vec<u64>> {
         Some(self.variable(name)?.shape())
+    }
+
+    /// Names of the variables of the file or group whose types are not read.
+    pub(crate) fn unread(&self) -> Vec<&str> {
+        let mut unread = Vec::new();
+        for path in self.packing.keys() {
+            let (group, name) = path.rsplit_once('/').unwrap_or(("", path));
+            let is_read = self.variables.iter().any(|own| own.name == name);
+            if group == self.group && !is_read {
+                unread.extend(presentable(name));
+            }
+        }
+        unread
     }
 
     /// How the numbers of a variable are stored.
@@ -281,8 +311,24 @@ impl NetcdfFile {
         }
     }
 
+    /// The groups in a group of this path, and those in them.
+    fn add_groups(&self, path: &str, group: &NcGroup, found: &mut Vec<NetcdfFile>) {
+        for inner in &group.groups {
+            let path = match path {
+                "" => inner.name.clone(),
+                path => format!("{path}/{}", inner.name),
+            };
+            found.push(NetcdfFile {
+                group: path.clone(),
+                variables: inner.variables.clone(),
+                ..self.clone()
+            });
+            self.add_groups(&path, inner, found);
+        }
+    }
+
     fn path_of(&self, variable: &NcVariable) -> String {
-        match self.group.is_empty() {
+        match self.group.is_empty() || self.shared.contains(&own_name(variable)) {
             true => variable.name.clone(),
             false => format!("{}/{}", self.group, variable.name),
         }
@@ -389,6 +435,28 @@ impl NetcdfFile {
         Ok(())
     }
 
+    /// Refuses whole numbers with attributes of other conventions, whose factors would be missed.
+    ///
+    /// # Errors
+    /// The first such attribute.
+    pub(crate) fn refuse_other_packing(&self, name: &str) -> Result<(), String> {
+        let Some(variable) = self.variable(name).filter(|v| !is_float(&v.dtype)) else {
+            return Ok(());
+        };
+        let is_packed = |own: &str| variable.attribute(own).is_some();
+        let found = variable.attributes.iter().find(|attribute| {
+            let own = attribute.name.to_ascii_lowercase();
+            OTHER_PACKING.contains(&own.as_str())
+        });
+        match found.filter(|_| !(is_packed("scale_factor") || is_packed("add_offset"))) {
+            Some(attribute) => Err(format!(
+                "variable {name} has whole numbers and the attribute {}, which is not read: scale_factor and add_offset are",
+                attribute.name
+            )),
+            None => Ok(()),
+        }
+    }
+
     /// Why a variable cannot be read, without anything of the file but the number of its filter.
     fn unreadable(&self, name: &str, error: &str) -> String {
         let is_hdf5 = matches!(self.file.format(), NcFormat::Nc4 | NcFormat::Nc4Classic);
@@ -422,6 +490,18 @@ impl NetcdfFile {
             .map_err(|needed| format!("{shown} has units = {}: {needed}", quoted(units)))
     }
 }
+
+/// Attributes that hold the factor or the offset of packed numbers in other conventions than netCDF's.
+const OTHER_PACKING: [&str; 8] = [
+    "gain",
+    "offset",
+    "scale",
+    "scaling_factor",
+    "scalefactor",
+    "slope",
+    "intercept",
+    "multiplier",
+];
 
 /// Filters of HDF5 that files of instruments have, by their registered numbers.
 const FILTERS: [(&str, &str); 8] = [

@@ -363,6 +363,29 @@ fn attributes_of_packed_numbers_that_cannot_be_understood_are_named() {
 }
 
 #[test]
+fn whole_numbers_with_a_factor_of_another_convention_are_refused() {
+    let plain = |name: &str| Variable::new(name, &["n"], Data::i32([1, 2]));
+    let factor = |variable: Variable, name: &'static str| variable.attr(name, Data::f64([0.5]));
+    let floats = Variable::new("c", &["n"], Data::f64([1.0, 2.0]));
+    let file = file_of(
+        vec![("n", 2)],
+        vec![
+            factor(plain("a"), "gain"),
+            factor(factor(plain("b"), "Scale"), "scale_factor"),
+            factor(floats, "gain"),
+        ],
+    );
+    let refused = file.refuse_other_packing("a").unwrap_err();
+    assert!(
+        refused.contains("whole numbers and the attribute gain"),
+        "{refused}"
+    );
+    for name in ["b", "c"] {
+        assert_eq!(file.refuse_other_packing(name), Ok(()));
+    }
+}
+
+#[test]
 fn values_along_falling_coordinates_are_turned_round_and_others_are_not() {
     let values = Data::f64((0..6).map(f64::from));
     let file = file_of(

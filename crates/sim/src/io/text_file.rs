@@ -73,10 +73,19 @@ pub(crate) fn decode(bytes: &[u8]) -> std::result::Result<String, usize> {
             Err(e) => return Err(e.valid_up_to()),
         },
     };
-    Ok(match text.strip_prefix('\u{feff}') {
+    let text = match text.strip_prefix('\u{feff}') {
         Some(behind_mark) => behind_mark.to_owned(),
         None => text,
-    })
+    };
+    Ok(with_line_feeds(text))
+}
+
+/// A text whose lines end as those of other systems: old ones end lines with a carriage return alone.
+pub(crate) fn with_line_feeds(text: String) -> String {
+    match text.contains('\r') && !text.contains('\n') {
+        true => text.replace('\r', "\n"),
+        false => text,
+    }
 }
 
 fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
@@ -161,6 +170,7 @@ mod tests {
             format!("\u{feff}{text}").into_bytes(),
             [0xFF, 0xFE].into_iter().chain(little).collect(),
             [0xFE, 0xFF].into_iter().chain(big).collect(),
+            text.replace('\n', "\r").into_bytes(),
         ] {
             assert_eq!(decode(&bytes).as_deref(), Ok(text));
         }

@@ -26,6 +26,10 @@ impl Quantity {
     /// # Errors
     /// What is allowed.
     pub(crate) fn si(self, text: &str) -> Result<f64, String> {
+        let text = text
+            .trim()
+            .trim_matches(['[', ']', '(', ')'])
+            .replace(['{', '}'], "");
         let factor = match text.trim() {
             "" if self == Self::Angle => Some(1f64.to_radians()),
             "" => Some(1.0),
@@ -138,6 +142,9 @@ mod tests {
             "m_s-1",
             "ms-1",
             "m s⁻¹",
+            "[m/s]",
+            "(m s^{-1})",
+            "mps",
         ] {
             close(Quantity::Velocity, text, 1.0);
         }

@@ -52,7 +52,7 @@ impl UtcTime {
         let date = calendar_date(&text[..end])?;
         let rest = text[end..].trim_start_matches(['T', '_']).trim();
         let end = rest
-            .find(|c: char| !(c.is_ascii_digit() || c == ':' || c == '.'))
+            .find(|c: char| !(c.is_ascii_digit() || matches!(c, ':' | '.' | ',')))
             .unwrap_or(rest.len());
         let second_of_day = second_of_day(&rest[..end])?;
         let east_s = zone_s(rest[end..].trim())?;
@@ -111,7 +111,7 @@ fn whole<T: std::str::FromStr>(text: &str) -> Option<T> {
 
 /// Seconds since midnight of `12:01:0.5`, `12:01`, `120100` or nothing.
 fn second_of_day(text: &str) -> Option<f64> {
-    let (clock, fraction) = text.split_once('.').unwrap_or((text, ""));
+    let (clock, fraction) = text.split_once(['.', ',']).unwrap_or((text, ""));
     let numbers: Vec<&str> = match clock.len() {
         0 => Vec::new(),
         6 if !clock.contains(':') => vec![&clock[..2], &clock[2..4], &clock[4..]],
@@ -229,6 +229,7 @@ mod tests {
         let read = |text: &str| UtcTime::parse_reference(text).map(|(t, f)| (t.to_string(), f));
         let half = Some(("2024-01-31T12:00:59Z".to_owned(), 0.5));
         assert_eq!(read("2024-01-31T12:00:59.500Z"), half);
+        assert_eq!(read("20240131 12:00:59,50"), half, "ISO 8601");
         assert_eq!(
             read("1970-1-1"),
             Some(("1970-01-01T00:00:00Z".into(), 0.0)),

@@ -10,7 +10,7 @@ use super::UtcTime;
 use super::csv_input::TextTable;
 use super::netcdf_input::{NetcdfFile, quoted};
 use super::units::{Quantity, split_date};
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
 
 /// A file with named variables.
@@ -49,6 +49,7 @@ impl VariableSource for NetcdfFile {
     }
 
     fn numbers(&self, name: &str) -> Result<Vec<f64>, String> {
+        self.refuse_other_packing(name)?;
         self.floats(name)
     }
 
@@ -113,11 +114,14 @@ pub(crate) struct VariableNames {
 
 pub(crate) const AWAY: &str = "radial_velocity_of_scatterers_away_from_instrument";
 pub(crate) const TOWARDS: &str = "radial_velocity_of_scatterers_toward_instrument";
+/// The same as some files spell it.
+const SAID_TOWARDS: &str = "radial_velocity_of_scatterers_towards_instrument";
 
 /// Radial velocities, positive away unless the standard name says otherwise.
 pub(crate) const VELOCITY: VariableNames = VariableNames {
-    names: "radial_velocity velocity v_mean radial_wind_speed vel vr vrad vradh doppler_velocity mean_doppler_velocity dv v_raw",
-    standard_names: &[AWAY, TOWARDS],
+    names: "radial_velocity velocity v_mean radial_wind_speed vel vr vrad vradh doppler_velocity mean_doppler_velocity dv v_raw \
+            radial_wind_velocity radial_speed line_of_sight_velocity los_velocity vlos rws",
+    standard_names: &[AWAY, TOWARDS, SAID_TOWARDS],
 };
 /// Standard deviations of radial velocities.
 pub(crate) const SIGMA: VariableNames = VariableNames {
@@ -137,7 +141,7 @@ pub(crate) const RANGE: VariableNames = VariableNames {
     standard_names: &["projection_range_coordinate"],
 };
 pub(crate) const ELEVATION: VariableNames = VariableNames {
-    names: "elevation elevation_angle ele elev",
+    names: "elevation elevation_angle ele elev el beam_elevation",
     standard_names: &[
         "ray_elevation_angle",
         "sensor_elevation_angle",
@@ -150,7 +154,7 @@ pub(crate) const ZENITH: VariableNames = VariableNames {
     standard_names: &["zenith_angle", "sensor_zenith_angle"],
 };
 pub(crate) const AZIMUTH: VariableNames = VariableNames {
-    names: "azimuth azimuth_angle azi",
+    names: "azimuth azimuth_angle azi az beam_azimuth",
     standard_names: &[
         "ray_azimuth_angle",
         "sensor_azimuth_angle",
@@ -158,7 +162,7 @@ pub(crate) const AZIMUTH: VariableNames = VariableNames {
     ],
 };
 pub(crate) const TIME: VariableNames = VariableNames {
-    names: "time timestamp",
+    names: "time timestamp datetime date_time time_utc utc_time unix_time",
     standard_names: &["time"],
 };
 /// Nyquist velocities: half the interval after which velocities repeat.
@@ -195,13 +199,17 @@ pub(crate) fn find<'s>(source: &'s dyn VariableSource, known: &VariableNames) ->
     })
 }
 
-/// Whether the name of a column without its unit is this one, in small or capital letters.
+/// Whether the name of a column without its unit is this one, in small or capital letters, with blanks or hyphens for the
+/// underscores or without them: `Radial velocity [m/s]`, `radialVelocity`.
 fn is_column(column: &str, name: &str) -> bool {
-    split_unit(column).0.eq_ignore_ascii_case(name)
+    let divides = |c: &char| !matches!(c, '_' | '-' | ' ');
+    let own = split_unit(column).0.chars().filter(divides);
+    own.map(|c| c.to_ascii_lowercase())
+        .eq(name.chars().filter(divides))
 }
 
 /// Units behind the names of columns, the longer ones first.
-const UNITS_OF_NAMES: [(&str, &str); 16] = [
+const UNITS_OF_NAMES: [(&str, &str); 19] = [
     ("_cm_s", "cm s-1"),
     ("_km_h", "km h-1"),
     ("_m_s", "m s-1"),
@@ -210,7 +218,10 @@ const UNITS_OF_NAMES: [(&str, &str); 16] = [
     ("_rad", "rad"),
     ("_seconds", "s"),
     ("_hours", "hours"),
+    ("_days", "days"),
     ("_ms", "ms"),
+    ("_us", "us"),
+    ("_ns", "ns"),
     ("_db", "dB"),
     ("_km", "km"),
     ("_cm", "cm"),
@@ -294,16 +305,33 @@ pub(crate) fn elevations_rad(
     source: &dyn VariableSource,
 ) -> Result<Option<(&str, Vec<f64>)>, String> {
     if let Some(name) = find(source, &ELEVATION) {
-        return Ok(Some((name, values(source, name, Quantity::Angle)?)));
+        return Ok(Some((name, stated_angles_rad(source, name)?)));
     }
     let Some(name) = find(source, &ZENITH) else {
         return Ok(None);
     };
-    let mut angles_rad = values(source, name, Quantity::Angle)?;
+    let mut angles_rad = stated_angles_rad(source, name)?;
     angles_rad
         .iter_mut()
         .for_each(|angle_rad| *angle_rad = FRAC_PI_2 - *angle_rad);
     Ok(Some((name, angles_rad)))
+}
+
+/// Angles, rad, whose unit is stated or which no radians are.
+///
+/// # Errors
+/// As [`values`]; angles without a unit that may be degrees or radians.
+fn stated_angles_rad(source: &dyn VariableSource, name: &str) -> Result<Vec<f64>, String> {
+    let angles_rad = values(source, name, Quantity::Angle)?;
+    let most_rad = angles_rad.iter().copied().fold(0.0, f64::max);
+    let most = most_rad.to_degrees();
+    match units(source, name).is_none() && most > 0.0 && most <= PI {
+        true => Err(format!(
+            "{} has no units, and its values up to {most:.4} may be degrees or radians: units = \"degrees\" or \"radians\" is needed",
+            shown(name)
+        )),
+        false => Ok(angles_rad),
+    }
 }
 
 /// A value for each ray, from a variable that has one for each ray, for each sweep, or for all.
@@ -411,23 +439,57 @@ fn says_plus_one(text: &str) -> bool {
 /// Whether velocities are positive towards the instrument: by the standard name, or by a remark.
 pub(crate) fn is_towards(source: &dyn VariableSource, name: &str) -> bool {
     let attribute = |attribute| source.attribute(name, attribute).unwrap_or_default();
-    if attribute("standard_name") == TOWARDS || says(attribute("positive"), &["toward"]) {
+    if [TOWARDS, SAID_TOWARDS].contains(&attribute("standard_name"))
+        || says(attribute("positive"), &["toward"])
+    {
         return true;
     }
-    ["long_name", "comment", "description"]
+    let remarks = [
+        "long_name",
+        "comment",
+        "description",
+        "note",
+        "sign_convention",
+        "convention",
+    ];
+    let said = remarks
         .iter()
-        .any(|remark| says_positive_towards(attribute(remark)))
+        .find_map(|remark| says_towards(attribute(remark)));
+    said == Some(true)
 }
 
-fn says_positive_towards(text: &str) -> bool {
-    let towards = [
-        "positivetoward",
-        "positiveistoward",
-        "positivevaluestoward",
-        "positivevaluesaretoward",
-        "positivemeanstoward",
-    ];
-    says(text, &towards) && !says(text, &["positiveaway", "awaypositive", "awayispositive"])
+/// Whether a remark says that velocities are positive towards the instrument or negative away from it; none where it says nothing of it.
+///
+/// A sign stands before its direction ("positive values are towards the lidar") or right behind it ("away is positive").
+fn says_towards(text: &str) -> Option<bool> {
+    /// Most words from a sign to its direction.
+    const FARTHEST: usize = 8;
+    let lower = text.to_ascii_lowercase();
+    let words: Vec<&str> = lower
+        .split(|c: char| !c.is_ascii_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .collect();
+    let sign = |word: &str| match word {
+        "positive" | "pos" => Some(true),
+        "negative" | "neg" => Some(false),
+        _ => None,
+    };
+    let direction = |word: &str| match word {
+        "toward" | "towards" | "approaching" | "inbound" => Some(true),
+        "away" | "receding" | "outbound" => Some(false),
+        _ => None,
+    };
+    let at = words.iter().position(|word| sign(word).is_some())?;
+    let is_positive = sign(words[at])?;
+    let before = &words[at.saturating_sub(2)..at];
+    let behind = &words[at + 1..words.len().min(at + 1 + FARTHEST)];
+    let behind = behind.iter().find_map(|word| direction(word));
+    let is_towards = before
+        .iter()
+        .rev()
+        .find_map(|word| direction(word))
+        .or(behind)?;
+    Some(is_towards == is_positive)
 }
 
 /// Whether a text has one of these forms, whatever its case, blanks and other signs.
@@ -493,7 +555,7 @@ impl Times {
 /// Seconds of some hundred years, which are counted from a later date.
 const FAR_S: f64 = 4e9;
 
-/// The times of `count` rays; unknown ones where the file has none or says them in words that are not understood.
+/// The times of `count` rays, one for each or one for all; unknown ones where the file has none or says them in words that are not understood.
 ///
 /// # Errors
 /// A variable that cannot be read, or has another number of values.
@@ -501,10 +563,13 @@ pub(crate) fn times(source: &dyn VariableSource, count: usize) -> Result<Times, 
     let Some(name) = find(source, &TIME) else {
         return Ok(Times::unknown(count, None));
     };
-    let found = match source.texts(name) {
+    let mut found = match source.texts(name) {
         Ok(texts) => times_of_texts(name, &texts),
         Err(_) => times_of_numbers(source, name)?,
     };
+    if let [only_s] = found.time_s[..] {
+        found.time_s = vec![only_s; count];
+    }
     match found.time_s.len() {
         own if own == count => Ok(found),
         own => Err(format!(

@@ -236,3 +236,69 @@ fn times_that_are_not_understood_are_unknown_and_named() {
         assert!(found.time_s[0].is_nan() && found.reference.is_none());
     }
 }
+
+#[test]
+fn remarks_say_in_many_words_where_velocities_are_positive() {
+    for (text, towards) in [
+        (
+            "Doppler velocity, negative values indicate motion away from the lidar",
+            true,
+        ),
+        ("positive values are towards the lidar", true),
+        ("approaching is positive", true),
+        ("radial velocity (negative: receding)", true),
+        (
+            "positive values indicate motion away from the instrument",
+            false,
+        ),
+        ("towards the lidar is negative, away is positive", false),
+        ("negative values towards the lidar", false),
+        ("radial velocity towards the receiver", false),
+        ("positive definite", false),
+    ] {
+        for attribute in ["long_name", "comment"] {
+            let file = Given::numbers("VEL", &[(attribute, text)], &[1.0]);
+            assert_eq!(is_towards(&file, "VEL"), towards, "{text}");
+        }
+    }
+}
+
+#[test]
+fn columns_are_found_in_any_spelling_of_their_names() {
+    for (header, unit) in [
+        ("Radial velocity [cm/s]", 0.01),
+        ("radialVelocity_m_s", 1.0),
+        ("LOS-velocity (km/h)", 1.0 / 3.6),
+    ] {
+        let table = table(&format!("{header}\n1.0\n2.0\n"));
+        let name = find(&table, &VELOCITY).expect(header);
+        let found = values(&table, name, Quantity::Velocity).expect(header);
+        assert!((found[1] - 2.0 * unit).abs() < 1e-12, "{header}: {found:?}");
+    }
+    let table = table("time_ns\n1700000000000000000\n");
+    let found = times(&table, 1).unwrap().time_s;
+    assert!((found[0] - 1.7e9).abs() < 1e-3, "{found:?}");
+}
+
+#[test]
+fn angles_without_a_unit_that_may_be_radians_are_refused() {
+    let angles = |units: &'static str, values: &[f64]| {
+        let file = Given::numbers("elevation", &[("units", units)], values);
+        elevations_rad(&file).map(|found| found.unwrap().1)
+    };
+    let refused = angles("", &[0.1, 0.2]).unwrap_err();
+    assert!(
+        refused.contains("values up to 0.2000 may be degrees or radians"),
+        "{refused}"
+    );
+    assert_eq!(angles("rad", &[0.1, 0.2]), Ok(vec![0.1, 0.2]));
+    assert!(angles("degrees", &[0.1, 0.2]).is_ok() && angles("", &[0.1, 4.0]).is_ok());
+}
+
+#[test]
+fn one_time_is_that_of_all_rays() {
+    let one = Given::numbers("time", &[("units", "s")], &[5.0]);
+    assert_eq!(times(&one, 3).unwrap().time_s, [5.0; 3]);
+    let two = Given::numbers("time", &[("units", "s")], &[5.0, 6.0]);
+    assert!(times(&two, 3).unwrap_err().contains("time has 2 values"));
+}

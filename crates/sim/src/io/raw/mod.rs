@@ -128,8 +128,8 @@ pub struct RawRecords {
     fills: Vec<f64>,
     /// The factor that the numbers of the source have had.
     packed_scale: f64,
-    /// The stored number of zero, which is subtracted before scaling: the middle code of a converter without sign.
-    pub zero: f64,
+    /// The stored number of zero of both parts, which is subtracted before scaling: the middle code of a converter without sign.
+    pub zero: Complex<f64>,
     /// What its numbers are multiplied with, A for signals in counts.
     pub scale: f64,
     /// Samples of this size and above are missing.
@@ -221,7 +221,7 @@ impl RawRecords {
                 FILL_VALUES.to_vec()
             },
             packed_scale: 1.0,
-            zero: 0.0,
+            zero: Complex::new(0.0, 0.0),
             scale: 1.0,
             outsized: f64::INFINITY,
             is_reversed: false,
@@ -280,10 +280,10 @@ impl RawRecords {
             .map_err(|reason| self.refuse(reason))?;
         for sample in &mut found {
             let im = match self.is_complex {
-                true => self.scaled(sample.im),
+                true => self.scaled(sample.im, self.zero.im),
                 false => 0.0,
             };
-            *sample = Complex::new(self.scaled(sample.re), im);
+            *sample = Complex::new(self.scaled(sample.re, self.zero.re), im);
             if sample.re.abs().max(sample.im.abs()) >= self.outsized {
                 sample.re = f64::NAN;
             }
@@ -297,11 +297,11 @@ impl RawRecords {
     }
 
     /// The value of a stored number; NaN for a missing one.
-    fn scaled(&self, stored: f64) -> f64 {
+    fn scaled(&self, stored: f64, zero: f64) -> f64 {
         if self.fills.contains(&stored) {
             f64::NAN
         } else {
-            (stored - self.zero) * self.scale
+            (stored - zero) * self.scale
         }
     }
 
@@ -423,7 +423,7 @@ fn records_of_array(
         pulses_per_line,
     };
     Ok(RawRecords {
-        zero,
+        zero: Complex::new(zero, zero),
         ..RawRecords::new(path, array, [records, samples], is_complex, are_integers)
     })
 }

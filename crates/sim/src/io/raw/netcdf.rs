@@ -48,6 +48,12 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
     let mut lengths = file
         .shape(&name)
         .ok_or_else(|| format!("it has no variable {name}"))?;
+    if let Some(NcType::Compound { .. }) = file.kind(&name) {
+        return Err(format!(
+            "variable {name} has numbers of several fields, as h5py stores complex ones: store their real and imaginary parts as two \
+             variables, the second named by --quadrature"
+        ));
+    }
     let second = second_quadrature(file, format, &name, &lengths)?;
     let are_pairs = second.is_none() && format.complex && lengths.last() == Some(&2);
     if are_pairs {
@@ -78,7 +84,7 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
     };
     let mut records = RawRecords::new(path, source, shape, is_complex, bits > 0);
     records.packed_scale = scale;
-    records.zero = zero;
+    records.zero = Complex::new(zero, zero);
     read_metadata(file, &mut records)?;
     Ok(records)
 }

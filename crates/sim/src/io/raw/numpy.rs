@@ -74,7 +74,13 @@ impl StoredArray {
     }
 
     fn from_header(text: &str, begin: u64) -> Result<Self, String> {
-        let kind = entry(text, "descr")
+        let description = entry(text, "descr").ok_or(NO_ARRAY)?;
+        if description.starts_with('[') {
+            return Err("its numbers have several fields; plain or complex numbers are read: a[\"i\"] + 1j * a[\"q\"] in numpy, by the names of \
+                 its fields"
+                .into());
+        }
+        let kind = Some(description)
             .and_then(|rest| rest.strip_prefix('\'')?.split('\'').next())
             .ok_or(NO_ARRAY)?;
         let fortran_order = entry(text, "fortran_order")

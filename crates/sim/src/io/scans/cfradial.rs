@@ -4,6 +4,7 @@
 //! another scan. Variables are read as `variable` says. Check: maps of this program, and of Py-ART and xradar in the tests of the program;
 //! files without Nyquist velocity, with ragged gates, another sign, several sweeps.
 
+use super::gate_layout::GateLayout;
 use super::grid::{RayRow, mean_count, of_mean, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
@@ -29,9 +30,10 @@ pub(super) fn scans(
     format: &ScanFormat,
     sweep: usize,
 ) -> Result<Found, String> {
-    let range_m = ranges(file)?;
+    let mut range_m = ranges(file)?;
     let velocity = VelocityVariable::new(file, format)?;
-    let rays = Rays::read(file, format, &velocity, range_m.len())?;
+    let mut rays = Rays::read(file, format, &velocity, range_m.len())?;
+    turn_falling(&mut range_m, &mut rays.rows);
     let pulse_width_s = pulse_width(file)?;
     let place_deg = place(file)?;
     let scene_toml = scene_of(file, &velocity);
@@ -85,12 +87,13 @@ pub(super) fn rays(
     format: &ScanFormat,
     sweep: usize,
 ) -> Result<FoundRays, String> {
-    let (_, elevation_rad) =
-        variable::elevations_rad(file)?.ok_or("it has no variable elevation")?;
-    let ranges_m = ray_ranges(file, elevation_rad.len())?;
+    let mut ranges_m = ray_ranges(file, elevations_rad(file)?.len())?;
     let velocity = VelocityVariable::new(file, format)?;
     let gates = ranges_m.first().map_or(0, Vec::len);
-    let rays = Rays::read(file, format, &velocity, gates)?;
+    let mut rays = Rays::read(file, format, &velocity, gates)?;
+    if let [common_m] = &mut ranges_m[..] {
+        turn_falling(common_m, &mut rays.rows);
+    }
     let place_deg = standing_place(file)?;
     let pulse_width_s = pulse_width(file)?;
     let scene_toml = scene_of(file, &velocity).map(str::to_owned);
@@ -185,9 +188,38 @@ fn standing_place(file: &NetcdfFile) -> Result<Option<[f64; 2]>, String> {
         .then_some(place_deg))
 }
 
-/// Whether a file or a group has rays.
+/// Whether a file or a group has rays: angles up, in no unit of length as the elevation of a place has.
 pub(super) fn has_rays(file: &NetcdfFile) -> bool {
-    variable::find(file, &ELEVATION).is_some() || variable::find(file, &ZENITH).is_some()
+    let name = variable::find(file, &ELEVATION).or_else(|| variable::find(file, &ZENITH));
+    name.is_some_and(|name| {
+        let units = file.text(name, "units").unwrap_or_default();
+        units.is_empty() || Quantity::Length.si(units).is_err()
+    })
+}
+
+/// Elevations of the rays, rad; one that all rays have is repeated for each azimuth.
+fn elevations_rad(file: &NetcdfFile) -> Result<Vec<f64>, String> {
+    let (_, mut elevation_rad) =
+        variable::elevations_rad(file)?.ok_or("it has no variable elevation")?;
+    if let [only_rad] = elevation_rad[..] {
+        let shape = variable::find(file, &AZIMUTH).and_then(|name| file.shape(name));
+        let azimuths = shape.map_or(1, |shape| shape.iter().product::<u64>());
+        machine::holds("its rays", 100.0 * azimuths as f64)?;
+        elevation_rad = vec![only_rad; azimuths as usize];
+    }
+    Ok(elevation_rad)
+}
+
+/// Turns ranges that fall from gate to gate round, with the velocities along them.
+fn turn_falling(range_m: &mut [f64], rows: &mut [RayRow]) {
+    if range_m.len() < 2 || range_m.windows(2).any(|pair| pair[1] >= pair[0]) {
+        return;
+    }
+    range_m.reverse();
+    for row in rows {
+        row.velocity_m_s.reverse();
+        row.sigma_m_s.reverse();
+    }
 }
 
 /// The rays of a file.
@@ -212,8 +244,7 @@ impl Rays {
         velocity: &VelocityVariable,
         gates: usize,
     ) -> Result<Self, String> {
-        let (_, elevation_rad) =
-            variable::elevations_rad(file)?.ok_or("it has no variable elevation")?;
+        let elevation_rad = elevations_rad(file)?;
         let count = elevation_rad.len();
         let sweeps = sweeps(file, count)?;
         let azimuth_rad = ray_values(file, &AZIMUTH, Quantity::Angle, count, &sweeps)?
@@ -224,13 +255,13 @@ impl Rays {
             None => None,
         };
         let times = times(file, count)?;
-        let layout = GateLayout::new(file, &velocity.name, count, gates)?;
-        let velocity_m_s = velocities_m_s(file, format, velocity, &layout)?;
+        let layout = GateLayout::new(file, &velocity.name, [count, gates])?;
+        let velocity_m_s = velocities_m_s(format, velocity, &layout)?;
         let counts = match velocity.is_mean {
-            true => layout.optional(file, "count")?,
+            true => layout.optional("count")?,
             false => None,
         };
-        let sigma_m_s = sigmas_m_s(file, &layout, counts.as_deref())?;
+        let sigma_m_s = sigmas_m_s(&layout, counts.as_deref())?;
         // Mirrored velocities are no multiple away from those of the air.
         let is_mirrored = variable::find(file, &NYQUIST)
             .and_then(|name| file.text(name, "folding"))
@@ -305,18 +336,18 @@ fn is_one_fold(fold_m_s: Option<f64>, other_m_s: Option<f64>) -> bool {
 /// Velocities of the gates of all rays, one ray after the other, m/s: positive away, NaN where they are noise or the instrument
 /// flags them.
 fn velocities_m_s(
-    file: &NetcdfFile,
     format: &ScanFormat,
     velocity: &VelocityVariable,
     layout: &GateLayout,
 ) -> Result<Vec<f64>, String> {
+    let file = layout.file;
     let mut velocity_m_s = layout.spread(
         &velocity.name,
         variable::values(file, &velocity.name, Quantity::Velocity)?,
     )?;
     let status_of = |name: &str| match format.ignores_status {
         true => Ok(None),
-        false => layout.optional(file, name),
+        false => layout.optional(name),
     };
     // A fraction of realisations, or 0 and 1.
     let flagged = status_of("flagged")?;
@@ -343,11 +374,8 @@ fn velocities_m_s(
 }
 
 /// Standard deviations of the velocities, m/s, if the file has them; of means over scans as many as it counts.
-fn sigmas_m_s(
-    file: &NetcdfFile,
-    layout: &GateLayout,
-    counts: Option<&[f64]>,
-) -> Result<Option<Vec<f64>>, String> {
+fn sigmas_m_s(layout: &GateLayout, counts: Option<&[f64]>) -> Result<Option<Vec<f64>>, String> {
+    let file = layout.file;
     let Some(name) = variable::find(file, &SIGMA) else {
         return Ok(None);
     };
@@ -375,7 +403,7 @@ impl VelocityVariable {
             Some(name) => return Err(format!("it has no variable {name}, which --field names")),
             None => variable::find(file, &VELOCITY)
                 .map(str::to_owned)
-                .ok_or("it has no radial velocity: none of its variables has that standard name or a usual name; --field names it")?,
+                .ok_or_else(|| no_velocity(file))?,
         };
         let is_towards = variable::is_towards(file, &name) || format.towards;
         let is_mean = file
@@ -389,99 +417,30 @@ impl VelocityVariable {
     }
 }
 
-/// How the gates of the rays are ordered in a variable: \[time, range\], or one ray after the other, each with its own number of gates.
-struct GateLayout {
-    /// Where each ray begins, and its gates.
-    rays: Vec<(usize, usize)>,
-    gates: usize,
-    /// Whether all rays have all gates.
-    is_full: bool,
-}
-
-impl GateLayout {
-    fn new(file: &NetcdfFile, name: &str, rays: usize, gates: usize) -> Result<Self, String> {
-        let shape = file.shape(name).unwrap_or_default();
-        match &shape[..] {
-            [a, b] if (*a, *b) == (rays as u64, gates as u64) => Ok(Self {
-                rays: (0..rays).map(|ray| (ray * gates, gates)).collect(),
-                gates,
-                is_full: true,
-            }),
-            [a, b] => Err(format!(
-                "variable {name} is {a} x {b}; {rays} rays x {gates} ranges are needed"
-            )),
-            [_] if file.has("ray_start_index") && file.has("ray_n_gates") => {
-                let starts = whole_numbers(file, "ray_start_index", rays)?;
-                let counts = whole_numbers(file, "ray_n_gates", rays)?;
-                let own: Vec<_> = starts.into_iter().zip(counts).collect();
-                if let Some((_, count)) = own.iter().find(|(_, count)| *count > gates) {
-                    return Err(format!("a ray has {count} gates, range {gates} values"));
-                }
-                // Velocities, their standard deviations and ratios, and the lines of the map.
-                machine::holds(
-                    &format!("{rays} rays x {gates} ranges"),
-                    40.0 * rays as f64 * gates as f64,
-                )?;
-                Ok(Self {
-                    rays: own,
-                    gates,
-                    is_full: false,
-                })
-            }
-            _ => Err(format!(
-                "variable {name} has {} dimensions; [time, range] are needed",
-                shape.len()
-            )),
-        }
-    }
-
-    /// The values \[ray, gate\] of a variable, one ray after the other; NaN for gates that a ray does not have.
-    fn spread(&self, name: &str, values: Vec<f64>) -> Result<Vec<f64>, String> {
-        let rays = self.rays.len();
-        let gates = self.gates;
-        let count = values.len();
-        if self.is_full && count != rays * gates {
-            return Err(format!(
-                "variable {name} has {count} values; {rays} rays x {gates} ranges are needed"
-            ));
-        }
-        let mut out = vec![f64::NAN; rays * gates];
-        for (ray, (start, count)) in self.rays.iter().enumerate() {
-            let own = values.get(*start..start + count);
-            let own =
-                own.ok_or_else(|| format!("variable {name} ends before the gates of ray {ray}"))?;
-            out[ray * gates..ray * gates + count].copy_from_slice(own);
-        }
-        Ok(out)
-    }
-
-    /// The plain numbers of a variable, if it is there.
-    fn optional(&self, file: &NetcdfFile, name: &str) -> Result<Option<Vec<f64>>, String> {
-        match file.has(name) {
-            true => self.spread(name, file.floats(name)?).map(Some),
-            false => Ok(None),
-        }
-    }
+/// What is said of a file without a variable of velocities, or with one of a type that is not read.
+fn no_velocity(file: &NetcdfFile) -> String {
+    let unread = file.unread();
+    let unread = match unread.first() {
+        Some(name) => format!(
+            "; its variable {name} is of a type that is not read: store it as 32-bit floats"
+        ),
+        None => String::new(),
+    };
+    format!(
+        "it has no radial velocity: none of its variables has that standard name or a usual name; --field names it{unread}"
+    )
 }
 
 /// Ranges of the centres of the gates, m, which are those of all rays.
 fn ranges(file: &NetcdfFile) -> Result<Vec<f64>, String> {
     let name = variable::find(file, &RANGE).ok_or("it has no variable range")?;
     let range_m = variable::values(file, name, Quantity::Length)?;
-    match file.shape(name).as_deref() {
-        Some([_, gates]) => same_rows(name, &range_m, *gates as usize),
-        Some([] | [_]) => Ok(range_m),
+    let mut shape = file.shape(name).unwrap_or_default();
+    shape.retain(|length| *length != 1);
+    match shape[..] {
+        [_, gates] => same_rows(name, &range_m, gates as usize),
+        [] | [_] => Ok(range_m),
         _ => Err(format!("variable {name} has more than two dimensions")),
-    }
-}
-
-/// Whole numbers of a variable, one for each ray.
-fn whole_numbers(file: &NetcdfFile, name: &str, rays: usize) -> Result<Vec<usize>, String> {
-    let values = file.floats(name)?;
-    let bad = values.iter().any(|v| !(*v >= 0.0 && *v < 1e9));
-    match bad || values.len() != rays {
-        true => Err(format!("{name} must have a whole number for each ray")),
-        false => Ok(values.into_iter().map(|v| v as usize).collect()),
     }
 }
 

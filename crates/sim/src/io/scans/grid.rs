@@ -19,8 +19,15 @@ pub(super) struct RayRow {
     pub(super) sigma_m_s: Vec<f64>,
 }
 
-/// Farthest range of a gate, m: that of a scene.
+/// Farthest range of the last gate, m: that of a scene; and the nearest.
 const FARTHEST_M: f64 = 1e6;
+const NEAREST_M: f64 = 10.0;
+/// Least width of a scan at its farthest gate, m: none of a vortex fits into less.
+const NARROWEST_M: f64 = 5.0;
+/// Velocities that no air has, m/s: their unit is another one, or a fill value was not named.
+const FASTEST_M_S: f64 = 500.0;
+/// Velocities of one value beyond this are missing ones, m/s.
+const FAST_M_S: f64 = 90.0;
 /// Fewest gates and velocities of a map.
 const FEWEST_GATES: usize = 3;
 const FEWEST_VELOCITIES: usize = 30;
@@ -76,6 +83,7 @@ pub(super) fn scan_map(
     });
     let sigma_m_s = line_sigmas_m_s(&lines, &mut velocity_m_s);
     check_velocities(&velocity_m_s).map_err(|reason| format!("{what}: {reason}"))?;
+    check_width(&lines, &range_m).map_err(|reason| format!("{what}: {reason}"))?;
     let mut elevation_rad = Vec::with_capacity(lines.len());
     let mut time_s = Vec::with_capacity(lines.len());
     for line in &lines {
@@ -113,12 +121,54 @@ fn check_ranges(range_m: &[f64]) -> Result<(), String> {
     {
         return Err("range must be at least 0 m at the first gate".into());
     }
-    match range_m.last().filter(|last| **last > FARTHEST_M) {
-        Some(far) => Err(format!(
-            "range reaches {far} m: at most {FARTHEST_M} m are read"
-        )),
-        None => Ok(()),
+    check_extent(range_m.last().copied().unwrap_or(f64::NAN))
+}
+
+/// Refuses ranges that end too near or too far, whose unit is another one.
+pub(super) fn check_extent(farthest_m: f64) -> Result<(), String> {
+    if farthest_m > FARTHEST_M {
+        return Err(format!(
+            "range reaches {farthest_m} m: at most {FARTHEST_M} m are read"
+        ));
     }
+    match farthest_m < NEAREST_M {
+        true => Err(format!(
+            "range reaches {farthest_m} m: at least {NEAREST_M} m are needed; ranges in km need that unit"
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Refuses elevations that span too little for a vortex, such as radians that are said to be degrees.
+fn check_width(lines: &[&[RayRow]], range_m: &[f64]) -> Result<(), String> {
+    let lowest_rad = lines[0][0].elevation_rad;
+    let highest_rad = lines[lines.len() - 1][0].elevation_rad;
+    let width_m = (highest_rad - lowest_rad) * range_m[range_m.len() - 1];
+    match width_m < NARROWEST_M {
+        true => Err(format!(
+            "its elevations from {:.4} to {:.4} degrees span {width_m:.2} m at the farthest gate: at least {NARROWEST_M} m are needed; \
+             elevations in radians need that unit",
+            lowest_rad.to_degrees(),
+            highest_rad.to_degrees()
+        )),
+        false => Ok(()),
+    }
+}
+
+/// What is wrong with velocities that no air has: too large ones, and large ones of one value, which stands for a missing one.
+pub(super) fn no_velocity(velocities_m_s: impl Iterator<Item = f64>) -> Option<String> {
+    const CURE: &str =
+        "its unit must be m/s, and a missing one its fill value, in a table an empty cell";
+    let mut fast: Vec<f64> = velocities_m_s.filter(|v| v.abs() >= FAST_M_S).collect();
+    if let Some(bad) = fast.iter().find(|v| v.abs() > FASTEST_M_S) {
+        return Some(format!("a velocity is {bad} m/s: {CURE}"));
+    }
+    fast.sort_by(f64::total_cmp);
+    let same = fast.windows(2).find(|pair| pair[0] == pair[1])?;
+    Some(format!(
+        "a velocity is {} m/s in more than one gate: {CURE}",
+        same[0]
+    ))
 }
 
 /// Refuses too few velocities, and such as no wind has.
@@ -135,10 +185,8 @@ fn check_velocities(velocity_m_s: &Array2<f64>) -> Result<(), String> {
             ),
         });
     }
-    match velocity_m_s.iter().find(|value| value.abs() > 500.0) {
-        Some(bad) => Err(format!(
-            "a velocity is {bad} m/s: its unit must be m/s, and a missing one its fill value"
-        )),
+    match no_velocity(velocity_m_s.iter().copied()) {
+        Some(reason) => Err(reason),
         None => Ok(()),
     }
 }
@@ -232,6 +280,29 @@ mod tests {
         missing
             .iter_mut()
             .for_each(|ray| ray.velocity_m_s = vec![-9999.0; 12]);
-        assert!(refused(missing, range_m()).contains("fill value"));
+        assert!(refused(missing.clone(), range_m()).contains("fill value"));
+        missing
+            .iter_mut()
+            .for_each(|ray| ray.velocity_m_s = (0..12).map(f64::from).collect());
+        missing[1].velocity_m_s[7] = -99.0;
+        assert!(scan_map(missing.clone(), range_m(), None, "it").is_ok());
+        missing[2].velocity_m_s[3] = -99.0;
+        assert!(refused(missing, range_m()).contains("-99 m/s in more than one gate"));
+    }
+
+    #[test]
+    fn angles_and_ranges_in_other_units_than_stated_are_refused() {
+        let degrees = rays([0.1, 0.2, 0.3].map(f64::to_radians));
+        let refused = scan_map(degrees, range_m(), None, "it").unwrap_err();
+        assert!(
+            refused.contains("from 0.1000 to 0.3000 degrees span 0.42 m"),
+            "{refused}"
+        );
+        let near = range_m().into_iter().map(|range_m| range_m / 1e3).collect();
+        let refused = scan_map(rays([0.1, 0.2, 0.3]), near, None, "it").unwrap_err();
+        assert!(
+            refused.contains("range reaches 0.12 m: at least 10 m"),
+            "{refused}"
+        );
     }
 }

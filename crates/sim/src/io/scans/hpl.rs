@@ -16,6 +16,8 @@ use std::path::Path;
 const OVERLAP_STEP_M: f64 = 3.0;
 /// Intensities above 1 by this many standard deviations of those below 1 are no noise.
 const SIGMAS_ABOVE_NOISE: f64 = 4.0;
+/// Fill values, which a HALO file cannot name, are larger than this in size (-999, 9999).
+const MISSING: f64 = 500.0;
 /// Most gates of a ray.
 const MOST_GATES: usize = 1_000_000;
 
@@ -52,6 +54,7 @@ fn parse<'t>(text: &'t str, format: &ScanFormat) -> Result<Parsed<'t>, String> {
     let header = Header::new(&head)?;
     let lines: Vec<(usize, &str)> = lines.filter(|(_, line)| !line.trim().is_empty()).collect();
     let (mut rays, intensities) = rays(&header, &lines)?;
+    check_intensities(&intensities)?;
     if let Some(stated) = header.rays.filter(|stated| *stated > rays.len()) {
         return Err(format!(
             "it is cut short: it has {} of {stated} rays",
@@ -161,15 +164,18 @@ fn rays(header: &Header, lines: &[(usize, &str)]) -> Result<(Vec<RayRow>, Vec<Ve
                     header.gates
                 )
             })?;
-            let row = numbers(line).filter(|row| row.len() >= 3 && row[0] == gate as f64);
+            let row = first_numbers(line, 3).filter(|row| row[0] == gate as f64);
             let row = row.ok_or_else(|| {
                 format!(
                     "line {}: gate {gate} of ray {ray} is expected, with velocity and intensity",
                     number + 1
                 )
             })?;
-            velocity_m_s[gate] = row[1];
-            intensity[gate] = row[2];
+            // No instrument measures such velocities, and no ratio plus 1 is far below 0: they stand for missing ones.
+            if row[1].abs() < MISSING && row[2] > -MISSING {
+                velocity_m_s[gate] = row[1];
+                intensity[gate] = row[2];
+            }
         }
         rays.push(RayRow {
             elevation_rad: elevation.to_radians(),
@@ -243,11 +249,24 @@ impl Header {
     }
 }
 
-/// Numbers of a line; a comma in a number is its point.
+/// Numbers of a line.
 fn numbers(line: &str) -> Option<Vec<f64>> {
-    line.split_whitespace()
-        .map(|word| word.replace(',', ".").parse().ok())
-        .collect()
+    line.split_whitespace().map(number).collect()
+}
+
+/// The first numbers of a line, whatever follows them; none of a line with fewer.
+fn first_numbers(line: &str, count: usize) -> Option<Vec<f64>> {
+    let words = line.split_whitespace().take(count);
+    let found: Option<Vec<f64>> = words.map(number).collect();
+    found.filter(|numbers| numbers.len() == count)
+}
+
+/// A number of a line, as Fortran may write it: a comma is its point, D stands for E, and stars for one that its column could not hold.
+fn number(word: &str) -> Option<f64> {
+    match word.bytes().all(|byte| byte == b'*') {
+        true => Some(f64::NAN),
+        false => word.replace(',', ".").replace(['D', 'd'], "E").parse().ok(),
+    }
 }
 
 /// The value of a key of the header; keys differ in case and in what follows them.
@@ -292,6 +311,19 @@ fn noise_deviation(intensities: &[Vec<f64>]) -> f64 {
         }
     }
     (sum / f64::from(count.max(1))).sqrt()
+}
+
+/// Refuses intensities that are no ratio of signal and noise plus 1, which is about 1 in noise.
+fn check_intensities(intensities: &[Vec<f64>]) -> Result<(), String> {
+    let known = intensities
+        .iter()
+        .flatten()
+        .filter(|value| value.is_finite());
+    let low = known.clone().filter(|value| **value < 0.5).count();
+    match 2 * low > known.count() {
+        true => Err("its third column should be the intensity, a ratio of signal and noise plus 1, but most of its values are below 0.5".into()),
+        false => Ok(()),
+    }
 }
 
 /// Takes out the velocities of noise.
@@ -392,6 +424,46 @@ mod tests {
             ..ScanFormat::default()
         };
         assert_eq!(read(&file(&[]), &towards).map.velocity_m_s[[0, 5]], -2.5);
+    }
+
+    #[test]
+    fn what_no_column_could_hold_and_fill_values_are_missing() {
+        let plain = read(&file(&[]), &ScanFormat::default()).map;
+        for (from, to) in [
+            ("1.0E-6", "1.0D-06"),
+            ("1.0E-6", "********"),
+            (" 1.0E-6", ""),
+        ] {
+            let map = read(&file(&[(from, to)]), &ScanFormat::default()).map;
+            assert_eq!(
+                map.velocity_m_s.column(5),
+                plain.velocity_m_s.column(5),
+                "{to}"
+            );
+        }
+        for missing in ["-999.0 -999.0", "-9999.0 1.2", "****** 1.2"] {
+            let text = file(&[("1.5000 1.200000", missing)]);
+            let map = read(&text, &ScanFormat::default()).map;
+            assert!(
+                map.velocity_m_s.column(4).iter().all(|v| v.is_nan()),
+                "{missing}"
+            );
+            assert_eq!(map.velocity_m_s.column(5), plain.velocity_m_s.column(5));
+        }
+        for other in ["0.200000", "-7.000000"] {
+            let text = file(&[
+                ("1.200000", other),
+                ("1.004000", "0.004"),
+                ("0.996000", "-0.004"),
+            ]);
+            let refused = scans(&text, Path::new("x.hpl"), &ScanFormat::default());
+            assert!(
+                refused
+                    .err()
+                    .unwrap()
+                    .contains("third column should be the intensity")
+            );
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //! `planes` finds the scans among the rays. Check: what the writers write comes back; files of other hands; damaged ones are refused with their field.
 
 mod cfradial;
+mod gate_layout;
 mod grid;
 mod hpl;
 mod planes;
@@ -188,8 +189,13 @@ fn netcdf(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
     let mut all = Found::default();
     let groups = open_groups(path, "elevation", cfradial::has_rays)?;
     for (sweep, group) in groups.into_iter().enumerate() {
-        let found = cfradial::scans(&group, path, format, sweep);
-        let found = found.map_err(|reason| group.refuse(reason))?;
+        let found = match cfradial::scans(&group, path, format, sweep) {
+            Ok(found) => found,
+            Err(reason) => {
+                all.skipped.push(group.named(reason));
+                continue;
+            }
+        };
         all.scans.extend(found.scans);
         all.skipped.extend(found.skipped);
         all.warnings.extend(found.warnings);
@@ -198,8 +204,9 @@ fn netcdf(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
 }
 
 fn text(path: &Path, length: u64, format: &ScanFormat) -> Result<Found, Error> {
-    let bytes = text_bytes(path, length)?;
-    scans_of_text(&bytes, path, format).map_err(|reason| Error::input(path, reason))
+    let text = decoded(&text_bytes(path, length)?, path);
+    text.and_then(|text| scans_of_text(&text, path, format))
+        .map_err(|reason| Error::input(path, reason))
 }
 
 /// The bytes of a text that is not too large.
@@ -213,31 +220,57 @@ fn text_bytes(path: &Path, length: u64) -> Result<Vec<u8>, Error> {
     std::fs::read(path).map_err(Error::io("read", path))
 }
 
-fn scans_of_text(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<Found, String> {
-    let (text, is_hpl) = decoded(bytes)?;
-    match is_hpl {
-        true if format.field.is_some() => Err(NO_FIELD.into()),
-        true => hpl::scans(&text, path, format),
-        false => table::scans(&text, path, format),
+fn scans_of_text(text: &Text, path: &Path, format: &ScanFormat) -> Result<Found, String> {
+    match text {
+        Text::Hpl(_) if format.field.is_some() => Err(NO_FIELD.into()),
+        Text::Hpl(text) => hpl::scans(text, path, format),
+        Text::Table(text) => table::scans(text, path, format),
     }
 }
 
-/// A text, and whether it is a HALO file.
-fn decoded(bytes: &[u8]) -> Result<(String, bool), String> {
+/// A text by its kind.
+enum Text {
+    Hpl(String),
+    Table(String),
+}
+
+/// The text of a file of scans.
+///
+/// # Errors
+/// Bytes that are no text; a file called as those of HALO without their header.
+fn decoded(bytes: &[u8], path: &Path) -> Result<Text, String> {
     // The text, and a text of its own for each cell.
     let cells = bytes
         .iter()
         .filter(|byte| matches!(byte, b',' | b';' | b'\n' | b' ' | b'\t'))
         .count();
     machine::holds("its table", 2.0 * bytes.len() as f64 + 64.0 * cells as f64)?;
+    if bytes.starts_with(b"PK\x03\x04") {
+        return Err("it is a ZIP archive, or a workbook, which is one: unpack it, or store the sheet as CSV".into());
+    }
     // Files of instruments have names of places in all encodings; numbers are the same in each.
-    let text =
-        text_file::decode(bytes).unwrap_or_else(|_| String::from_utf8_lossy(bytes).into_owned());
+    let text = text_file::decode(bytes).unwrap_or_else(|_| {
+        text_file::with_line_feeds(bytes.iter().map(|byte| char::from(*byte)).collect())
+    });
+    if text.contains('\0') {
+        return Err("it is no text, nor NetCDF: it has bytes of value 0; a table in UTF-8, or UTF-16 behind its mark, a HALO file or NetCDF is \
+                    read"
+            .into());
+    }
     let is_hpl = text
         .lines()
         .take(60)
         .any(|line| line.trim_start().starts_with("****"));
-    Ok((text, is_hpl))
+    let is_called_hpl = path
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("hpl"));
+    match (is_hpl, is_called_hpl) {
+        (true, _) => Ok(Text::Hpl(text)),
+        (false, true) => Err("it has no line ****, which ends the header of a HALO file of rays; profiles of winds and of the background are \
+                              not read"
+            .into()),
+        (false, false) => Ok(Text::Table(text)),
+    }
 }
 
 /// What is said of a variable of velocities in a file that has one column of them.
@@ -281,5 +314,34 @@ mod tests {
         let mut without = [scan("a", None), scan("b", None)];
         assert!(share_origin(&mut without.iter_mut().collect::<Vec<_>>()).is_empty());
         assert_eq!(without[1].map.time_s, [1.0, 2.0]);
+    }
+
+    #[test]
+    fn what_is_no_text_of_a_scan_is_told_apart() {
+        let kind = |bytes: &[u8], name: &str| match decoded(bytes, Path::new(name)) {
+            Ok(Text::Hpl(text)) => format!("hpl {}", text.lines().count()),
+            Ok(Text::Table(text)) => format!("table {}", text.lines().count()),
+            Err(reason) => reason,
+        };
+        for end in ["\n", "\r\n", "\r"] {
+            let hpl = ["Number of gates: 3", "****", "12.0 90.0 3.0"].join(end);
+            assert_eq!(kind(hpl.as_bytes(), "a.hpl"), "hpl 3");
+            assert_eq!(kind(hpl.as_bytes(), "a.txt"), "hpl 3");
+            let table = ["# x", "a,b", "1,2"].join(end);
+            assert_eq!(kind(table.as_bytes(), "a.csv"), "table 3");
+        }
+        assert_eq!(kind(b"Site:\tZ\xFCrich\n****\n", "a.hpl"), "hpl 2");
+        for (bytes, name, words) in [
+            (
+                &b"12\n 24.0 200.0 5.0\n"[..],
+                "Processed.HPL",
+                "no line ****",
+            ),
+            (b"PK\x03\x04\0\0", "a.xlsx", "ZIP archive"),
+            (b"a\0,\0b\0", "a.csv", "bytes of value 0"),
+        ] {
+            let refused = kind(bytes, name);
+            assert!(refused.contains(words), "{refused}");
+        }
     }
 }

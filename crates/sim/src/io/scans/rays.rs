@@ -3,17 +3,14 @@
 //!
 //! Check: files of all formats with cones, stares and gates that differ from ray to ray; what no ray of a lidar has.
 
+use super::grid::{check_extent, no_velocity};
 use super::planes::ALLOWED_RAD;
-use super::{ScanFormat, cfradial, hpl, table};
+use super::{ScanFormat, Text, cfradial, hpl, table};
 use crate::Error;
 use crate::io::netcdf_input::open_groups;
 use crate::io::{UtcTime, text_file};
 use std::path::{Path, PathBuf};
 
-/// Velocities that no air has, m/s: their unit is another one, or a fill value was not named.
-const FASTEST_M_S: f64 = 500.0;
-/// Farthest range of a gate, m: that of a scene.
-const FARTHEST_M: f64 = 1e6;
 /// Fraction of the rays whose elevations may be impossible; more say that the unit is another one.
 const IMPOSSIBLE: f64 = 0.1;
 
@@ -99,21 +96,28 @@ fn netcdf(path: &Path, format: &ScanFormat) -> Result<FoundRays, Error> {
     let mut sweeps = Vec::new();
     let mut notes = Vec::new();
     let groups = open_groups(path, "elevation", cfradial::has_rays)?;
+    let mut refused = Vec::new();
     for (number, group) in groups.into_iter().enumerate() {
-        let found = cfradial::rays(&group, path, format, number);
-        let (own, warnings) = found.map_err(|reason| group.refuse(reason))?;
-        sweeps.extend(own);
-        notes.extend(warnings);
+        match cfradial::rays(&group, path, format, number) {
+            Ok((own, warnings)) => {
+                sweeps.extend(own);
+                notes.extend(warnings);
+            }
+            Err(reason) => refused.push(group.named(reason)),
+        }
     }
+    if sweeps.is_empty() {
+        return Err(Error::input(path, refused.join("; ")));
+    }
+    notes.extend(refused.into_iter().map(|what| format!("{what}: skipped")));
     Ok((sweeps, notes))
 }
 
 fn of_text(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<FoundRays, String> {
-    let (text, is_hpl) = super::decoded(bytes)?;
-    match is_hpl {
-        true if format.field.is_some() => Err(super::NO_FIELD.into()),
-        true => hpl::rays_of_text(&text, path, format),
-        false => table::rays_of_text(&text, path, format),
+    match super::decoded(bytes, path)? {
+        Text::Hpl(_) if format.field.is_some() => Err(super::NO_FIELD.into()),
+        Text::Hpl(text) => hpl::rays_of_text(&text, path, format),
+        Text::Table(text) => table::rays_of_text(&text, path, format),
     }
 }
 
@@ -150,18 +154,13 @@ fn check(sweeps: &mut [RaySweep]) -> Result<Option<String>, String> {
     }
     let kept: usize = sweeps.iter().map(|sweep| sweep.rays.len()).sum();
     let mut velocities = 0;
+    let mut farthest_m = f64::NEG_INFINITY;
     for ray in sweeps.iter().flat_map(|sweep| &sweep.rays) {
         for (range_m, velocity_m_s) in ray.range_m.iter().zip(&ray.velocity_m_s) {
-            if velocity_m_s.abs() > FASTEST_M_S {
-                return Err(format!(
-                    "a velocity is {velocity_m_s} m/s: its unit must be m/s, and a missing one its fill value"
-                ));
+            if *range_m < 0.0 {
+                return Err(format!("range is {range_m} m: at least 0 m is needed"));
             }
-            if range_m.is_finite() && !(0.0..=FARTHEST_M).contains(range_m) {
-                return Err(format!(
-                    "range is {range_m} m: from 0 to {FARTHEST_M} m are read"
-                ));
-            }
+            farthest_m = farthest_m.max(*range_m);
             velocities += usize::from(range_m.is_finite() && velocity_m_s.is_finite());
         }
     }
@@ -170,6 +169,11 @@ fn check(sweeps: &mut [RaySweep]) -> Result<Option<String>, String> {
     }
     if velocities == 0 {
         return Err("all of its velocities are missing".into());
+    }
+    check_extent(farthest_m)?;
+    let rays = sweeps.iter().flat_map(|sweep| &sweep.rays);
+    if let Some(reason) = no_velocity(rays.flat_map(|ray| ray.velocity_m_s.iter().copied())) {
+        return Err(reason);
     }
     Ok((kept < all).then(|| {
         format!(

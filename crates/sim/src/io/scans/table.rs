@@ -154,6 +154,7 @@ struct Columns<'t> {
     /// Whether this program wrote the table.
     is_own: bool,
     velocity: usize,
+    range: usize,
     elevation: usize,
     sweep: Option<usize>,
     flagged: Option<usize>,
@@ -201,6 +202,7 @@ impl<'t> Columns<'t> {
             format,
             is_own,
             velocity: table.column(velocity).unwrap_or_default(),
+            range: table.column(range).unwrap_or_default(),
             elevation: table.column(elevation).unwrap_or_default(),
             sweep: table.column("sweep").or_else(|| table.column("scan")),
             flagged: table.column("flagged"),
@@ -237,8 +239,13 @@ impl<'t> Columns<'t> {
         let range_m = self.rounded(self.range_m[row]);
         let mut elevation_rad = self.elevation_rad[row];
         if !(range_m.is_finite() && elevation_rad.is_finite()) {
+            let cell = match range_m.is_finite() {
+                true => &cells[self.elevation],
+                false => &cells[self.range],
+            };
             return Err(format!(
-                "row {number}: its range or elevation is not a number"
+                "row {number}: its range or elevation is not a number: {}",
+                quoted(cell)
             ));
         }
         if self.is_own {
@@ -247,7 +254,8 @@ impl<'t> Columns<'t> {
         let velocity_m_s = self.rounded(self.velocity_m_s[row]);
         if velocity_m_s.is_nan() && !is_missing(&cells[self.velocity]) {
             return Err(format!(
-                "row {number}: its velocity is not a number; leave the cell of a missing one empty"
+                "row {number}: its velocity is not a number: {}; leave the cell of a missing one empty",
+                quoted(&cells[self.velocity])
             ));
         }
         let count = self.count.map(|column| self.table.number(row, column));
@@ -318,8 +326,9 @@ fn optional_column(
 
 /// Whether a cell says that there is no number.
 fn is_missing(cell: &str) -> bool {
+    let words = ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"];
     let text = cell.trim();
-    text.is_empty() || text.eq_ignore_ascii_case("nan")
+    words.iter().any(|word| text.eq_ignore_ascii_case(word))
 }
 
 /// The names of the first columns of a table.

@@ -363,25 +363,56 @@ pub(crate) fn samples<S: Sample>(
         .map_err(|_| records.refuse("it became shorter".into()))
 }
 
-/// Sizes of the samples of a file, and the mean of the first parts of each record that has some.
-fn survey(records: &mut RawRecords) -> Result<(SampleSizes, Vec<f64>), Error> {
-    let mut sizes = SampleSizes::default();
-    let mut means = Vec::new();
+/// What is known of the samples of a file before they are used.
+#[derive(Default)]
+struct Survey {
+    sizes: SampleSizes,
+    /// The mean of each record that has a sample.
+    means: Vec<Complex<f64>>,
+    /// The sum of the samples at each place of a record, and their number.
+    places: Vec<(Complex<f64>, f64)>,
+}
+
+/// Surveys the samples of a file.
+fn survey(records: &mut RawRecords) -> Result<Survey, Error> {
+    let mut found = Survey {
+        places: vec![(Complex::new(0.0, 0.0), 0.0); records.samples],
+        ..Survey::default()
+    };
     for piece in pieces(0..records.records, records.samples) {
         for record in records.read(piece)?.chunks(records.samples) {
-            let mut sum = 0.0;
+            let mut sum = Complex::new(0.0, 0.0);
             let mut count = 0.0;
-            for sample in record.iter().filter(|sample| sample.is_finite()) {
-                sizes.add(sample.largest_part());
-                sum += sample.re;
+            for (sample, place) in record.iter().zip(&mut found.places) {
+                if !sample.is_finite() {
+                    continue;
+                }
+                found.sizes.add(sample.largest_part());
+                sum += *sample;
                 count += 1.0;
+                place.0 += *sample;
+                place.1 += 1.0;
             }
             if count > 0.0 {
-                means.push(sum / count);
+                found.means.push(sum / count);
             }
         }
     }
-    Ok((sizes, means))
+    Ok(found)
+}
+
+/// Whether a mean is that of most places of a record, as an offset is and a hard target is not.
+fn is_along_records(mean: Complex<f64>, places: &[(Complex<f64>, f64)]) -> bool {
+    /// Part of the mean by which the median of the places may differ.
+    const SAME: f64 = 0.25;
+    let median = |part: fn(Complex<f64>) -> f64| {
+        let known = places.iter().filter(|(_, count)| *count > 0.0);
+        let mut all: Vec<f64> = known.map(|(sum, count)| part(sum / count)).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+    };
+    let median = Complex::new(median(|value| value.re), median(|value| value.im));
+    (median - mean).norm() < SAME * mean.norm()
 }
 
 /// Fewest records that show whether their mean is none of chance.
@@ -390,27 +421,31 @@ const FEWEST_RECORDS: usize = 16;
 const SURE: f64 = 12.0;
 
 /// The offset of a converter: the mean of the records, where it is far beyond what their scatter leaves to chance.
-fn constant_offset(means: &[f64]) -> Option<f64> {
+fn constant_offset(means: &[Complex<f64>]) -> Option<Complex<f64>> {
     if means.len() < FEWEST_RECORDS {
         return None;
     }
     let count = means.len() as f64;
-    let mean = means.iter().sum::<f64>() / count;
-    let square_sum: f64 = means.iter().map(|own| (own - mean).powi(2)).sum();
+    let mean = means.iter().sum::<Complex<f64>>() / count;
+    let square_sum: f64 = means.iter().map(|own| (own - mean).norm_sqr()).sum();
     let standard_error = (square_sum / (count * (count - 1.0))).sqrt();
-    (mean.abs() > SURE * standard_error).then_some(mean)
+    (mean.norm() > SURE * standard_error).then_some(mean)
 }
 
 /// The largest part of all samples, the outsized ones left out from here on; refuses records without any, and codes that the
-/// scene's converter does not have. A constant offset of real samples of an instrument is subtracted from here on, as no frequency of
-/// the band is 0; about 0 Hz, where complex samples have their band, it cannot be distinguished from an echo.
+/// scene's converter does not have. A constant offset of the samples of an instrument is subtracted from here on: echoes of the air have
+/// other phases in each record, and a hard target has some places of it.
 fn largest_part(
     plan: &Plan,
     is_own: bool,
     records: &mut RawRecords,
     observer: &dyn Observer,
 ) -> Result<f64, Error> {
-    let (sizes, means) = survey(records)?;
+    let Survey {
+        sizes,
+        means,
+        places,
+    } = survey(records)?;
     let outsized = |records: &RawRecords, sizes: &SampleSizes| match records.are_integers {
         true => f64::INFINITY,
         false => sizes.outsized(),
@@ -434,20 +469,73 @@ fn largest_part(
             largest / records.whole_scale()
         )));
     }
-    let offset = match is_own || records.is_complex {
+    let offset = match is_own {
         true => None,
         false => constant_offset(&means),
     };
+    let offset = offset.filter(|mean| !records.is_complex || is_along_records(*mean, &places));
     let Some(offset) = offset else {
         return Ok(largest);
     };
     let path = records.path.display();
+    let shown = match records.is_complex {
+        true => format!("{:.4e} {:+.4e} i", offset.re, offset.im),
+        false => format!("{:.4e}", offset.re),
+    };
     observer.warn(&format!(
-        "{path}: the mean of its samples is {offset:.4e}, which no echo makes: it is subtracted"
+        "{path}: the mean of its samples is {shown}, which no echo makes: it is subtracted"
     ));
-    records.zero += offset / records.scale;
+    // Complex samples with a reversed spectrum are conjugates of the stored ones.
+    let stored = match records.is_complex && records.is_reversed {
+        true => offset.conj(),
+        false => offset,
+    };
+    records.zero += stored / records.scale;
     records.outsized = f64::INFINITY;
-    let (sizes, _) = survey(records)?;
+    let sizes = survey(records)?.sizes;
     records.outsized = outsized(records, &sizes);
     Ok(sizes.largest_below(records.outsized))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_offset_of_all_records_is_none_of_their_scatter() {
+        let phase = |record: i32| Complex::from_polar(0.1, 2.4 * f64::from(record));
+        let about = |offset: Complex<f64>, count: i32| {
+            let means: Vec<_> = (0..count).map(|record| offset + phase(record)).collect();
+            constant_offset(&means)
+        };
+        for offset in [Complex::new(2.0, 0.0), Complex::new(-3.0, 1.5)] {
+            let found = about(offset, 40).expect("an offset");
+            assert!((found - offset).norm() < 0.02, "{found}");
+            assert_eq!(about(offset, 8), None, "too few records");
+        }
+        assert_eq!(about(Complex::new(0.05, -0.05), 40), None);
+        let offset = Complex::new(1.0, -2.0);
+        let of_places = |target: usize| -> Vec<_> {
+            let echo = |place: usize| {
+                if place < target {
+                    10.0
+                } else {
+                    0.1 * (place as f64).sin()
+                }
+            };
+            (0..100)
+                .map(|place| (4.0 * (offset + echo(place)), 4.0))
+                .collect()
+        };
+        assert!(is_along_records(offset, &of_places(0)));
+        let of_target = Complex::new(2.0, 0.0);
+        let places: Vec<_> = of_places(20)
+            .iter()
+            .map(|(sum, count)| (sum - 4.0 * offset, *count))
+            .collect();
+        assert!(
+            !is_along_records(of_target, &places),
+            "a hard target in a fifth of the record"
+        );
+    }
 }
