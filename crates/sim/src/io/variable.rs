@@ -460,15 +460,10 @@ pub(crate) fn is_towards(source: &dyn VariableSource, name: &str) -> bool {
 
 /// Whether a remark says that velocities are positive towards the instrument or negative away from it; none where it says nothing of it.
 ///
-/// A sign stands before its direction ("positive values are towards the lidar") or right behind it ("away is positive").
+/// A sign stands before its direction ("positive values are towards the lidar") or behind it in a clause ("away is positive").
 fn says_towards(text: &str) -> Option<bool> {
     /// Most words from a sign to its direction.
     const FARTHEST: usize = 8;
-    let lower = text.to_ascii_lowercase();
-    let words: Vec<&str> = lower
-        .split(|c: char| !c.is_ascii_alphanumeric())
-        .filter(|word| !word.is_empty())
-        .collect();
     let sign = |word: &str| match word {
         "positive" | "pos" => Some(true),
         "negative" | "neg" => Some(false),
@@ -479,16 +474,28 @@ fn says_towards(text: &str) -> Option<bool> {
         "away" | "receding" | "outbound" => Some(false),
         _ => None,
     };
-    let at = words.iter().position(|word| sign(word).is_some())?;
-    let is_positive = sign(words[at])?;
-    let before = &words[at.saturating_sub(2)..at];
-    let behind = &words[at + 1..words.len().min(at + 1 + FARTHEST)];
-    let behind = behind.iter().find_map(|word| direction(word));
-    let is_towards = before
-        .iter()
-        .rev()
-        .find_map(|word| direction(word))
-        .or(behind)?;
+    let lower = text.to_ascii_lowercase();
+    // The direction before a sign is in the same clause.
+    let mut before = Vec::new();
+    let mut is_positive = None;
+    let mut behind = Vec::new();
+    for clause in lower.split([',', ';', '(']) {
+        if is_positive.is_none() {
+            before.clear();
+        }
+        for word in clause.split(|c: char| !c.is_ascii_alphanumeric()) {
+            match is_positive {
+                None if sign(word).is_some() => is_positive = sign(word),
+                None => before.push(word),
+                Some(_) if !word.is_empty() => behind.push(word),
+                Some(_) => {}
+            }
+        }
+    }
+    let is_positive = is_positive?;
+    let before = before.iter().rev().find_map(|word| direction(word));
+    let behind = behind.iter().take(FARTHEST);
+    let is_towards = before.or_else(|| behind.clone().find_map(|word| direction(word)))?;
     Some(is_towards == is_positive)
 }
 

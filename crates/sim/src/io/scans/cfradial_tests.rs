@@ -354,7 +354,9 @@ fn what_contradicts_itself_is_refused_by_name() {
         refused(&|m| m.0.get_mut("VEL").unwrap().1 = vec![("units", "furlongs")])
             .contains("VEL has units = \"furlongs\"")
     );
-    assert!(refused(&|m| m.0.get_mut("time").unwrap().2 = vec![0.0]).contains("time has 1 values"));
+    assert!(
+        refused(&|m| m.0.get_mut("time").unwrap().2 = vec![0.0; 3]).contains("time has 3 values")
+    );
     assert!(
         refused(&|m| m.0.get_mut("sweep_end_ray_index").unwrap().2 = vec![5.0, 99.0])
             .contains("ray 99")

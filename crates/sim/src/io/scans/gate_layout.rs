@@ -103,11 +103,14 @@ impl<'f> GateLayout<'f> {
             let angles = [&ELEVATION, &ZENITH, &AZIMUTH, &TIME];
             angles.into_iter().any(|known| is_along(known, dim))
         });
+        // A dimension of both, as plain HDF5 has it for equal lengths, is evidence of neither.
+        let gates_alone = [0, 1].map(|at| are_gates[at] && !are_rays[at]);
+        let rays_alone = [0, 1].map(|at| are_rays[at] && !are_gates[at]);
         let called_gates = [slow, fast].map(|dim| is_called(GATES, dim));
         let called_rays = [slow, fast].map(|dim| is_called(RAYS, dim));
         for (is_slow, is_fast, means_turned) in [
-            (are_gates[0], are_gates[1], true),
-            (are_rays[0], are_rays[1], false),
+            (gates_alone[0], gates_alone[1], true),
+            (rays_alone[0], rays_alone[1], false),
             (called_gates[0], called_gates[1], true),
             (called_rays[0], called_rays[1], false),
         ] {

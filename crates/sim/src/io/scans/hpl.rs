@@ -362,7 +362,7 @@ mod tests {
             let hours = (23.99 + 0.005 * f64::from(ray)) % 24.0;
             out += &format!(
                 "{hours:.5} 90.00 {:.2} 0.0 0.0\n",
-                1.0 + 0.5 * f64::from(ray)
+                1.0 + 3.0 * f64::from(ray)
             );
             for gate in 0..8 {
                 let intensity = if gate < 6 {
@@ -442,7 +442,7 @@ mod tests {
             );
         }
         for missing in ["-999.0 -999.0", "-9999.0 1.2", "****** 1.2"] {
-            let text = file(&[("1.5000 1.200000", missing)]);
+            let text = file(&[(" 1.5000 1.200000", &format!(" {missing}"))]);
             let map = read(&text, &ScanFormat::default()).map;
             assert!(
                 map.velocity_m_s.column(4).iter().all(|v| v.is_nan()),
