@@ -120,22 +120,10 @@ fn measure(program: &Path, scratch: &Path) -> Result<f64, Failure> {
     Ok(one_s / f64::from(steps * stages * i32::pow(cells, 3)))
 }
 
-/// A line of the example `exchange_times`: cells of a rank, bytes of a message and its time.
-struct Exchange {
-    cells: f64,
-    bytes: f64,
-    time_s: f64,
-}
-
-impl Exchange {
-    fn parse(line: &str) -> Option<Self> {
-        let mut numbers = line.split(',').skip(2).map(|word| word.parse().ok());
-        Some(Self {
-            cells: numbers.next()??,
-            bytes: numbers.next()??,
-            time_s: numbers.next()??,
-        })
-    }
+/// The numbers of a line of the example `exchange_times`: cells of a rank, bytes of a message and its time \[s\].
+fn exchange(line: &str) -> Option<[f64; 3]> {
+    let mut numbers = line.split(',').skip(2).map(|word| word.parse().ok());
+    Some([numbers.next()??, numbers.next()??, numbers.next()??])
 }
 
 /// Prints how long single exchanges last on 2 to 4 ranks by the size of their messages, and how well equal slabs would scale by it if the
@@ -153,20 +141,20 @@ fn exchanges(program: &Path, cell_s: f64) -> Outcome {
         let text = output(mpirun(count).arg(program))?;
         let lines: Vec<&str> = text.lines().skip(1).collect();
         for pair in lines.chunks(2) {
-            let halos = pair.first().and_then(|line| Exchange::parse(line));
-            let turn = pair.get(1).and_then(|line| Exchange::parse(line));
-            let (Some(halos), Some(turn)) = (halos, turn) else {
+            let halos = pair.first().and_then(|line| exchange(line));
+            let turn = pair.get(1).and_then(|line| exchange(line));
+            let (Some([cells, halo_bytes, halos_s]), Some([_, turn_bytes, turn_s])) = (halos, turn)
+            else {
                 return Err(Failure::new(format!("exchange_times prints\n{text}")));
             };
-            let work_s = halos.cells * cell_s;
-            let exchange_s = TURNS * turn.time_s + PLANES / WHOLE * halos.time_s;
+            let work_s = cells * cell_s;
+            let exchange_s = TURNS * turn_s + PLANES / WHOLE * halos_s;
             println!(
-                "| {count} | {} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} |",
-                halos.cells,
-                1e-6 * turn.bytes,
-                1e3 * turn.time_s,
-                1e-6 * halos.bytes,
-                1e3 * halos.time_s,
+                "| {count} | {cells} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} |",
+                1e-6 * turn_bytes,
+                1e3 * turn_s,
+                1e-6 * halo_bytes,
+                1e3 * halos_s,
                 work_s / (work_s + exchange_s)
             );
         }

@@ -28,95 +28,91 @@ struct Module<'a> {
 /// Names that one file takes from another.
 pub(crate) type Imports<'a> = BTreeMap<&'a str, BTreeMap<&'a str, BTreeSet<String>>>;
 
-/// The modules of the workspace.
-pub(crate) struct Modules<'a>(BTreeMap<Place, Module<'a>>);
+/// Modules by their places.
+type Modules<'a> = BTreeMap<Place, Module<'a>>;
 
-impl<'a> Modules<'a> {
-    /// Of source files and their texts; what is not below a `src` is left out, and what is no Rust has no imports.
-    pub(crate) fn new(files: &[(&'a str, &str)]) -> Self {
-        let mut modules = BTreeMap::new();
-        for (file, text) in files {
-            if let Some(place) = place(file) {
-                modules.insert(place, Module::parse(file, text));
-            }
+/// Which of some source files, given with their texts, takes which names from which; constants that a module takes from the one above it
+/// do not count if `but_constants`. What is not below a `src` is left out, and what is no Rust has no imports.
+pub(crate) fn imports<'a>(files: &[(&'a str, &str)], but_constants: bool) -> Imports<'a> {
+    let mut modules = Modules::new();
+    for (file, text) in files {
+        if let Some(place) = place(file) {
+            modules.insert(place, Module::parse(file, text));
         }
-        Self(modules)
     }
-
-    /// Which file takes which names from which; constants that a module takes from the one above it do not count if
-    /// `but_constants`.
-    pub(crate) fn imports(&self, but_constants: bool) -> Imports<'a> {
-        let mut out = Imports::new();
-        for (from, module) in &self.0 {
-            for path in &module.taken {
-                let name = path.last().cloned().unwrap_or_default();
-                let Some(to) = self
-                    .absolute(from, path)
-                    .and_then(|path| self.resolve(from, &path, 0))
-                else {
-                    continue;
-                };
-                let is_above = to.1.len() < from.1.len() && from.1.starts_with(&to.1);
-                let is_constant = self.0[to].items.get(&name) == Some(&true);
-                if to != from && !(but_constants && is_above && is_constant) {
-                    out.entry(module.file)
-                        .or_default()
-                        .entry(self.0[to].file)
-                        .or_default()
-                        .insert(name);
-                }
-            }
-        }
-        out
-    }
-
-    /// The path from the root of the crate; none if it leads to another crate.
-    fn absolute(&self, at: &Place, path: &[String]) -> Option<Vec<String>> {
-        let mut base = at.1.clone();
-        let mut rest = path;
-        while let Some((word @ ("crate" | "self" | "super"), more)) =
-            rest.split_first().map(|(word, more)| (word.as_str(), more))
-        {
-            match word {
-                "crate" => base.clear(),
-                "super" => drop(base.pop()),
-                _ => {}
-            }
-            rest = more;
-        }
-        let is_relative = rest.len() < path.len();
-        let is_child = |child: &[String]| {
-            let place = (at.0.clone(), [&base[..], child].concat());
-            self.0.contains_key(&place)
-        };
-        (is_relative || is_child(&rest[..1])).then(|| [&base[..], rest].concat())
-    }
-
-    /// The module that holds what a path names, through what modules hand on.
-    fn resolve(&self, at: &Place, path: &[String], depth: usize) -> Option<&Place> {
-        let (to, module, rest) = (0..=path.len()).rev().find_map(|n| {
-            let (to, module) = self.0.get_key_value(&(at.0.clone(), path[..n].to_vec()))?;
-            Some((to, module, &path[n..]))
-        })?;
-        let Some(name) = rest
-            .first()
-            .filter(|name| !module.items.contains_key(*name) && depth < 6)
-        else {
-            return Some(to);
-        };
-        for path in &module.handed {
-            if path.last() != Some(name) {
+    let mut out = Imports::new();
+    for (from, module) in &modules {
+        for path in &module.taken {
+            let name = path.last().cloned().unwrap_or_default();
+            let Some(to) =
+                absolute(&modules, from, path).and_then(|path| resolve(&modules, from, &path, 0))
+            else {
                 continue;
-            }
-            let found = self
-                .absolute(to, path)
-                .and_then(|path| self.resolve(to, &path, depth + 1));
-            if found.is_some() {
-                return found;
+            };
+            let is_above = to.1.len() < from.1.len() && from.1.starts_with(&to.1);
+            let is_constant = modules[to].items.get(&name) == Some(&true);
+            if to != from && !(but_constants && is_above && is_constant) {
+                out.entry(module.file)
+                    .or_default()
+                    .entry(modules[to].file)
+                    .or_default()
+                    .insert(name);
             }
         }
-        Some(to)
     }
+    out
+}
+
+/// The path from the root of the crate; none if it leads to another crate.
+fn absolute(modules: &Modules<'_>, at: &Place, path: &[String]) -> Option<Vec<String>> {
+    let mut base = at.1.clone();
+    let mut rest = path;
+    while let Some((word @ ("crate" | "self" | "super"), more)) =
+        rest.split_first().map(|(word, more)| (word.as_str(), more))
+    {
+        match word {
+            "crate" => base.clear(),
+            "super" => drop(base.pop()),
+            _ => {}
+        }
+        rest = more;
+    }
+    let is_relative = rest.len() < path.len();
+    let is_child = |child: &[String]| {
+        let place = (at.0.clone(), [&base[..], child].concat());
+        modules.contains_key(&place)
+    };
+    (is_relative || is_child(&rest[..1])).then(|| [&base[..], rest].concat())
+}
+
+/// The module that holds what a path names, through what modules hand on.
+fn resolve<'m>(
+    modules: &'m Modules<'_>,
+    at: &Place,
+    path: &[String],
+    depth: usize,
+) -> Option<&'m Place> {
+    let (to, module, rest) = (0..=path.len()).rev().find_map(|n| {
+        let (to, module) = modules.get_key_value(&(at.0.clone(), path[..n].to_vec()))?;
+        Some((to, module, &path[n..]))
+    })?;
+    let Some(name) = rest
+        .first()
+        .filter(|name| !module.items.contains_key(*name) && depth < 6)
+    else {
+        return Some(to);
+    };
+    for path in &module.handed {
+        if path.last() != Some(name) {
+            continue;
+        }
+        let found =
+            absolute(modules, to, path).and_then(|path| resolve(modules, to, &path, depth + 1));
+        if found.is_some() {
+            return found;
+        }
+    }
+    Some(to)
 }
 
 /// Groups of files each of which imports every other, in one step or several; a module and those right below it may.
@@ -326,7 +322,7 @@ mod tests {
     use super::*;
 
     fn found(files: &[(&'static str, &str)], but_constants: bool) -> Vec<Vec<&'static str>> {
-        circles(&Modules::new(files).imports(but_constants))
+        circles(&imports(files, but_constants))
     }
 
     #[test]

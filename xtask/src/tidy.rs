@@ -6,7 +6,7 @@
 mod links;
 
 use crate::process::output;
-use crate::sources::{Imports, Modules, circles, is_test_file};
+use crate::sources::{Imports, circles, imports, is_test_file};
 use crate::workspace::{read, root};
 use fixtures::failure::{Failure, Outcome};
 use serde::Deserialize;
@@ -225,7 +225,7 @@ fn check_imports(files: &[SourceFile], found: &mut Vec<String>) {
             sources.push((file.path.as_str(), file.text.as_str()));
         }
     }
-    let imports = Modules::new(&sources).imports(true);
+    let imports = imports(&sources, true);
     check_circles(&imports, found);
     for (folder, layers) in &RULES.layers {
         check_layers(&imports, folder, layers, found);
@@ -438,7 +438,7 @@ mod tests {
         let scene = |text| ("crates/x/src/scene.rs", text);
         let violations = |files: &[(&'static str, &str)]| {
             let mut found = Vec::new();
-            let imports = Modules::new(files).imports(true);
+            let imports = imports(files, true);
             check_layers(&imports, "crates/x", &layers, &mut found);
             found
         };

@@ -14,18 +14,11 @@ use wakescope_sim::SceneFile;
 #[serde(deny_unknown_fields)]
 pub(super) struct Cases {
     scene: Table,
-    pattern: BTreeMap<String, Pattern>,
+    /// Patterns of lines of sight: the keys of a scene, and `lines` that no pattern of scenes has.
+    pattern: BTreeMap<String, Table>,
     air: BTreeMap<String, Table>,
     /// The scans, in the order of their cases.
     pub(super) scan: Vec<ScanCase>,
-}
-
-/// A pattern of lines of sight: the keys of a scene, and the lines that no pattern of scenes has.
-#[derive(Debug, Deserialize)]
-struct Pattern {
-    lines: Option<Lines>,
-    #[serde(flatten)]
-    scene: Table,
 }
 
 /// Lines of sight of a list.
@@ -93,10 +86,11 @@ impl Cases {
 
     /// The scene of a scan; a list of its lines is written to a folder that exists.
     pub(super) fn scene(&self, case: &ScanCase, folder: &Path) -> Result<SceneFile, Failure> {
-        let pattern = entry(&self.pattern, &case.pattern)?;
+        let mut pattern = entry(&self.pattern, &case.pattern)?.clone();
         let air = entry(&self.air, &case.air)?;
+        let lines = pattern.remove("lines");
         let mut scene = self.scene.clone();
-        lay_over(&mut scene, &pattern.scene);
+        lay_over(&mut scene, &pattern);
         lay_over(&mut scene, air);
         if let Some(snr_db) = case.snr_db {
             lay_over(
@@ -104,7 +98,8 @@ impl Cases {
                 &toml::from_str(&format!("detector.snr.snr_db = {snr_db:?}"))?,
             );
         }
-        if let Some(lines) = &pattern.lines {
+        if let Some(lines) = lines {
+            let lines: Lines = lines.try_into()?;
             let name = format!("{}.csv", case.pattern);
             std::fs::write(folder.join(&name), lines.list())?;
             let list = format!("scan.pattern = {{ kind = \"list\", file = {name:?} }}");
@@ -116,7 +111,7 @@ impl Cases {
 }
 
 /// The part of that name.
-fn entry<'p, T>(parts: &'p BTreeMap<String, T>, name: &str) -> Result<&'p T, Failure> {
+fn entry<'p>(parts: &'p BTreeMap<String, Table>, name: &str) -> Result<&'p Table, Failure> {
     let part = parts.get(name);
     part.ok_or_else(|| Failure::new(format!("cases.toml has no {name}")))
 }

@@ -2,8 +2,8 @@
 
 use super::context::*;
 use super::study::{
-    EARLY_TAU, INSIDE_M, METHODS, NamedZone, OUTSIDE_M, REFERENCES, Sight, Study, Zone, batches,
-    early_scene, with_method, with_turbulence,
+    EARLY_TAU, INSIDE_M, METHODS, OUTSIDE_M, REFERENCES, Sight, Study, Zone, early_scene,
+    with_method, with_turbulence,
 };
 
 const ENERGIES_J: [f64; 4] = [50e-6, 150e-6, 300e-6, 600e-6];
@@ -95,7 +95,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let origin = context.provenance_of_formula(&shown.to_toml());
     let panels = REFERENCES.map(|(reference, _)| panel(curves, reference));
     let mut out = Rendered::new(&table(curves), &Figure::stacked(panels), &origin)?;
-    out.add("batches.csv", &batches_table(&all), &origin)?;
+    out.add("batches.csv", &batches_table(&all)?, &origin)?;
     out.marks = vec![sight.mark];
     let [few, many] = scans;
     out.values = vec![many.to_string(), few.to_string(), sight.words];
@@ -157,7 +157,7 @@ fn table(curves: &[Curve]) -> Table {
         )
 }
 
-fn batches_table(curves: &[Curve]) -> Table {
+fn batches_table(curves: &[Curve]) -> Result<Table, Failure> {
     let mut zones = Vec::new();
     for c in curves {
         let case = format!("{}; {:.0} uJ", c.reference, 1e6 * c.energy_j);
@@ -169,10 +169,10 @@ fn batches_table(curves: &[Curve]) -> Table {
             ("outside, far half", far),
         ];
         for (name, zone) in of_curve {
-            zones.push(NamedZone::new(&case, name, f64::NAN, zone));
+            zones.push(zone.batches(&case, name, f64::NAN));
         }
     }
-    batches(&zones)
+    Ok(Table::stack(zones)?)
 }
 
 /// The energies at the chapter's reference.

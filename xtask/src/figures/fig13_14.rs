@@ -4,7 +4,7 @@
 use super::context::*;
 use super::profiles::{self, Profiles};
 use super::study::{
-    EARLY_TAU, METHODS, REFERENCES, Sight, Study, batches, near_scene, with_method, with_turbulence,
+    EARLY_TAU, METHODS, REFERENCES, Sight, Study, near_scene, with_method, with_turbulence,
 };
 use wakescope_sim::scene::PulseShape;
 
@@ -86,7 +86,7 @@ fn compare(
         zones.extend(p.regions(&p.title()));
         zones.extend(p.gates(&p.title()));
     }
-    out.add("batches.csv", &batches(&zones), &origin)?;
+    out.add("batches.csv", &Table::stack(zones)?, &origin)?;
     let [[few, _], [short, long]] = scans;
     let many = if short == long {
         short.to_string()

@@ -42,31 +42,30 @@ impl Row {
     }
 }
 
-/// One pulse, noise and signal-to-noise ratio.
-struct Case {
-    pulse_s: f64,
-    noise: NoiseModel,
-    snr_db: f64,
-}
+/// Pulse \[s\], noise and signal-to-noise ratio \[dB\] of some windows.
+type Case = (f64, NoiseModel, f64);
 
-impl Case {
-    /// Trials of all estimators.
-    fn rows(&self, pulses: &[usize], trials: usize, seed: u64) -> Result<Vec<Row>, Failure> {
-        let air = Air::new(self.noise, self.pulse_s, self.snr_db, seed)?;
-        let mut rows = Vec::new();
-        for errors in errors(&air, pulses, trials)? {
-            rows.push(Row {
-                method: errors.method,
-                noise: self.noise,
-                pulse_s: self.pulse_s,
-                pulses: errors.pulses,
-                snr_db: self.snr_db,
-                bound_m_s: bound_m_s(&air.known, errors.pulses)?,
-                found: good_and_bad(&errors.errors_m_s, BAND_M_S),
-            });
-        }
-        Ok(rows)
+/// Trials of all estimators.
+fn rows(
+    (pulse_s, noise, snr_db): Case,
+    pulses: &[usize],
+    trials: usize,
+    seed: u64,
+) -> Result<Vec<Row>, Failure> {
+    let air = Air::new(noise, pulse_s, snr_db, seed)?;
+    let mut rows = Vec::new();
+    for errors in errors(&air, pulses, trials)? {
+        rows.push(Row {
+            method: errors.method,
+            noise,
+            pulse_s,
+            pulses: errors.pulses,
+            snr_db,
+            bound_m_s: bound_m_s(&air.known, errors.pulses)?,
+            found: good_and_bad(&errors.errors_m_s, BAND_M_S),
+        });
     }
+    Ok(rows)
 }
 
 fn cases(context: &Context) -> Vec<Case> {
@@ -77,11 +76,7 @@ fn cases(context: &Context) -> Vec<Case> {
     for pulse_s in pulses_s {
         for noise in NOISES {
             for snr_db in (-20..=20).step_by(5) {
-                cases.push(Case {
-                    pulse_s,
-                    noise,
-                    snr_db: f64::from(snr_db),
-                });
+                cases.push((pulse_s, noise, f64::from(snr_db)));
             }
         }
     }
@@ -94,16 +89,17 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .choose(vec![1, 20, 60], vec![1, 20, 60], vec![1, 20, 60, 200]);
     let trials = context.profile.choose(250, 2000, 20_000);
     // The tables of the likelihood for each case are made on one thread: cases run side by side.
-    let rows: Vec<Vec<Row>> = cases(context)
+    let of_cases: Vec<Vec<Row>> = cases(context)
         .into_par_iter()
         .map(|case| {
+            let (.., snr_db) = case;
             // The quick profile accumulates the largest number only where a claim needs it.
-            let is_short = context.profile == Profile::Quick && case.snr_db != MANY_PULSES_DB;
+            let is_short = context.profile == Profile::Quick && snr_db != MANY_PULSES_DB;
             let counts = &counts[..counts.len() - usize::from(is_short)];
-            case.rows(counts, trials, context.seed)
+            rows(case, counts, trials, context.seed)
         })
         .collect::<Result<_, _>>()?;
-    let rows: Vec<Row> = rows.into_iter().flatten().collect();
+    let rows: Vec<Row> = of_cases.into_iter().flatten().collect();
     let parameters = format!(
         "profile = \"{}\"\ntrials = {trials}\nwindow_samples = {WINDOW}\npulses = {counts:?}\n",
         context.profile.name()

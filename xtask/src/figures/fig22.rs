@@ -22,6 +22,8 @@ const METHODS: [&str; 3] = ["fit", "fit, turbulence of the scan", "rv"];
 const FIT: usize = 0;
 const OF_SCAN: usize = 1;
 const RV: usize = 2;
+/// The test for a wake, after the methods.
+const DETECT: usize = METHODS.len();
 
 /// Stated standard errors over the scatter of errors.
 const STATED: Bar = Bar::Between(0.7, 1.4);
@@ -66,8 +68,7 @@ radius_m = 0.0
 method = { kind = "first_moment" }
 "#;
 
-/// One vortex of one scan by one method; NaN where it was not found.
-#[derive(Clone, Copy)]
+/// One vortex of one scan by one method, NaN where it was not found, or what is detected in the turbulence of a scan.
 struct Row {
     dissipation_m2_s3: f64,
     snr_db: f64,
@@ -75,14 +76,15 @@ struct Row {
     scan: usize,
     error_m2_s: f64,
     stated_m2_s: f64,
+    /// The circulation that is detected nine times in ten, at a rate of false alarms of one in a hundred.
+    detected_m2_s: Measured,
 }
 
-/// The circulation that is detected nine times in ten in the turbulence of a scan, at a rate of false alarms of one in a hundred.
-struct Detected {
-    dissipation_m2_s3: f64,
-    snr_db: f64,
-    circulation_m2_s: Measured,
-}
+/// A circulation that is not known.
+const UNKNOWN: Measured = Measured {
+    value: f64::NAN,
+    std: f64::NAN,
+};
 
 /// The rows of one method at one dissipation rate and one signal-to-noise ratio.
 struct Case {
@@ -94,9 +96,13 @@ struct Case {
 }
 
 impl Case {
-    fn new(rows: &[Row], like: Row) -> Self {
+    fn new(rows: &[Row], dissipation_m2_s3: f64, snr_db: f64, method: usize) -> Self {
         let mut scans: Vec<Vec<(f64, f64)>> = Vec::new();
-        for row in rows.iter().filter(|row| row.is_of_case(&like)) {
+        for row in rows {
+            let is_in_air = row.dissipation_m2_s3 == dissipation_m2_s3 && row.snr_db == snr_db;
+            if !is_in_air || row.method != method {
+                continue;
+            }
             scans.resize(scans.len().max(row.scan + 1), Vec::new());
             if row.error_m2_s.is_finite() {
                 scans[row.scan].push((row.error_m2_s, row.stated_m2_s));
@@ -104,9 +110,9 @@ impl Case {
         }
         scans.retain(|vortices| !vortices.is_empty());
         Self {
-            dissipation_m2_s3: like.dissipation_m2_s3,
-            snr_db: like.snr_db,
-            method: like.method,
+            dissipation_m2_s3,
+            snr_db,
+            method,
             scans,
         }
     }
@@ -146,14 +152,6 @@ impl Case {
     }
 }
 
-impl Row {
-    fn is_of_case(&self, other: &Self) -> bool {
-        self.dissipation_m2_s3 == other.dissipation_m2_s3
-            && self.snr_db == other.snr_db
-            && self.method == other.method
-    }
-}
-
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let scans = context.profile.choose(8, 48, 200);
     let mut dissipations_m2_s3 = context.profile.choose(
@@ -182,24 +180,18 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             rows.extend(of_case.retrieved()?);
             detected.push(of_case.detected(context.profile.choose(1000, 10_000, 10_000))?);
             for method in 0..METHODS.len() {
-                let like = Row {
-                    dissipation_m2_s3,
-                    snr_db,
-                    method,
-                    scan: 0,
-                    error_m2_s: 0.0,
-                    stated_m2_s: 0.0,
-                };
-                cases.push(Case::new(&rows, like));
+                cases.push(Case::new(&rows, dissipation_m2_s3, snr_db, method));
             }
         }
     }
     let origin = context.provenance_of_formula(SCENE);
     let picture = picture(levels_db, &cases, &detected);
-    let mut out = Rendered::new(&table(&rows, &detected), &picture, &origin)?;
+    let rises = rises(&detected);
+    rows.append(&mut detected);
+    let mut out = Rendered::new(&table(&rows), &picture, &origin)?;
     out.values = vec![scans.to_string()];
     out.claims = claims(&cases);
-    out.claims.push(Claim::judged("CT2", &rises(&detected)));
+    out.claims.push(Claim::judged("CT2", &rises));
     Ok(out)
 }
 
@@ -259,11 +251,12 @@ impl Scans<'_> {
             scan: row.realisation,
             error_m2_s: found.map_or(f64::NAN, |gamma| gamma.value - true_m2_s),
             stated_m2_s: found.map_or(f64::NAN, |gamma| gamma.std),
+            detected_m2_s: UNKNOWN,
         }
     }
 
     /// What the test for a wake detects in the turbulence of one scan; `empty_scans` are drawn for its threshold.
-    fn detected(&self, empty_scans: usize) -> Result<Detected, Failure> {
+    fn detected(&self, empty_scans: usize) -> Result<Row, Failure> {
         let mut scene = self.scene(TESTED)?;
         scene.retrieval = None;
         scene.scan.realisations = 1;
@@ -292,10 +285,14 @@ impl Scans<'_> {
         let (_, calibration) = detect(&maps, &settings, &Silent)?;
         let lacking = || Failure::new("no scan to detect a wake in".to_owned());
         let power = calibration.ok_or_else(lacking)?.power(&settings, &Silent)?;
-        Ok(Detected {
+        Ok(Row {
             dissipation_m2_s3: self.dissipation_m2_s3,
             snr_db: self.snr_db,
-            circulation_m2_s: Measured {
+            method: DETECT,
+            scan: 0,
+            error_m2_s: f64::NAN,
+            stated_m2_s: f64::NAN,
+            detected_m2_s: Measured {
                 value: power.smallest_m2_s.0,
                 std: power.smallest_error_m2_s,
             },
@@ -304,37 +301,26 @@ impl Scans<'_> {
 }
 
 /// A row for each vortex of each scan and method, and one for what is detected in each case.
-fn table(rows: &[Row], detected: &[Detected]) -> Table {
-    let mut method = column(rows, |row| METHODS[row.method]);
-    let mut scan = column(rows, |row| row.scan as i64);
-    let mut dissipation_m2_s3 = column(rows, |row| row.dissipation_m2_s3);
-    let mut snr_db = column(rows, |row| row.snr_db);
-    let mut error_m2_s = column(rows, |row| row.error_m2_s);
-    let mut std_m2_s = column(rows, |row| row.stated_m2_s);
-    let mut detected_m2_s = vec![f64::NAN; rows.len()];
-    let mut detected_error_m2_s = vec![f64::NAN; rows.len()];
-    for case in detected {
-        method.push("detect");
-        scan.push(0);
-        dissipation_m2_s3.push(case.dissipation_m2_s3);
-        snr_db.push(case.snr_db);
-        error_m2_s.push(f64::NAN);
-        std_m2_s.push(f64::NAN);
-        detected_m2_s.push(case.circulation_m2_s.value);
-        detected_error_m2_s.push(case.circulation_m2_s.std);
-    }
+fn table(rows: &[Row]) -> Table {
+    let method = |row: &Row| METHODS.get(row.method).copied().unwrap_or("detect");
     Table::new()
-        .text("method", method)
-        .int("scan", scan)
-        .float("dissipation_m2_s3", dissipation_m2_s3)
-        .float("snr_db", snr_db)
-        .float("gamma_error_m2_s", error_m2_s)
-        .float("gamma_std_m2_s", std_m2_s)
-        .float("detected_m2_s", detected_m2_s)
-        .float("detected_error_m2_s", detected_error_m2_s)
+        .text("method", column(rows, method))
+        .int("scan", column(rows, |row| row.scan as i64))
+        .float(
+            "dissipation_m2_s3",
+            column(rows, |row| row.dissipation_m2_s3),
+        )
+        .float("snr_db", column(rows, |row| row.snr_db))
+        .float("gamma_error_m2_s", column(rows, |row| row.error_m2_s))
+        .float("gamma_std_m2_s", column(rows, |row| row.stated_m2_s))
+        .float("detected_m2_s", column(rows, |row| row.detected_m2_s.value))
+        .float(
+            "detected_error_m2_s",
+            column(rows, |row| row.detected_m2_s.std),
+        )
 }
 
-fn picture(levels_db: &[f64], cases: &[Case], detected: &[Detected]) -> Figure {
+fn picture(levels_db: &[f64], cases: &[Case], detected: &[Row]) -> Figure {
     let mut panels = Vec::with_capacity(levels_db.len() + 1);
     for &snr_db in levels_db {
         let title = format!("Γ at {snr_db} dB: errors, and standard errors (dashed)");
@@ -349,7 +335,7 @@ fn picture(levels_db: &[f64], cases: &[Case], detected: &[Detected]) -> Figure {
     for (colour, &snr_db) in levels_db.iter().enumerate() {
         let mut points = Vec::new();
         for case in detected.iter().filter(|case| case.snr_db == snr_db) {
-            let Measured { value, std } = case.circulation_m2_s;
+            let Measured { value, std } = case.detected_m2_s;
             points.push((case.dissipation_m2_s3.cbrt(), Estimate::stated(value, std)));
         }
         let name = format!("{snr_db} dB");
@@ -377,7 +363,7 @@ fn errors<'c>(title: &str, cases: impl Iterator<Item = &'c Case> + Clone) -> Cur
 }
 
 /// By how much stronger turbulence raises the circulation that is detected, at each level.
-fn rises(detected: &[Detected]) -> Vec<Part> {
+fn rises(detected: &[Row]) -> Vec<Part> {
     let mut parts = Vec::new();
     for weak in detected
         .iter()
@@ -385,7 +371,7 @@ fn rises(detected: &[Detected]) -> Vec<Part> {
     {
         let strong = detected.iter().rfind(|case| case.snr_db == weak.snr_db);
         if let Some(strong) = strong {
-            let [of_weak, of_strong] = [weak, strong].map(|case| case.circulation_m2_s);
+            let [of_weak, of_strong] = [weak, strong].map(|case| case.detected_m2_s);
             let ratio = of_strong.value / of_weak.value;
             let relative = (of_weak.std / of_weak.value).hypot(of_strong.std / of_strong.value);
             let ratio = Estimate::stated(ratio, ratio * relative);

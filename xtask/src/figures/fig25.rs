@@ -2,7 +2,7 @@
 
 use super::context::*;
 use super::profiles::{self, Profiles};
-use super::study::{EARLY_TAU, METHODS, Sight, Study, Zone, batches, near_scene, with_method};
+use super::study::{EARLY_TAU, METHODS, Sight, Study, Zone, near_scene, with_method};
 use wakescope_sim::scene::{NoiseModel, Refinement, VortexPair};
 
 /// Ratio at which cores and bins are compared, near that of the chapter, and the one at which noise is, near the physical one, dB.
@@ -12,18 +12,11 @@ const STRONG_DB: f64 = 20.0;
 /// The core that the chapter calls typical, and larger ones, in spacings.
 const CORES: [f64; 4] = [0.05, 0.075, 0.1, 0.15];
 
-/// The flow that is observed.
-#[derive(Clone, Copy, PartialEq)]
-enum Seen {
-    Wake,
-    /// The analytic pair with a core radius in spacings.
-    Pair(f64),
-}
-
 /// One setting of flow and lidar.
 #[derive(Clone, Copy, PartialEq)]
 struct Case {
-    seen: Seen,
+    /// Core radius of the analytic pair that is observed, in spacings; none of the simulated wake.
+    core_b0: Option<f64>,
     snr_db: f64,
     noise: NoiseModel,
     pulses: usize,
@@ -32,7 +25,7 @@ struct Case {
 }
 
 const WAKE: Case = Case {
-    seen: Seen::Wake,
+    core_b0: None,
     snr_db: CHAPTER_DB,
     noise: NoiseModel::BandLimited,
     pulses: 1,
@@ -54,7 +47,7 @@ const PAIR: Case = pair(CORES[0]);
 
 const fn pair(core: f64) -> Case {
     Case {
-        seen: Seen::Pair(core),
+        core_b0: Some(core),
         ..WAKE
     }
 }
@@ -118,18 +111,10 @@ impl Case {
         scene
     }
 
-    fn core_b0(&self) -> f64 {
-        if let Seen::Pair(core) = self.seen {
-            core
-        } else {
-            f64::NAN
-        }
-    }
-
     fn name(&self) -> String {
-        let flow = match self.seen {
-            Seen::Wake => "wake".into(),
-            Seen::Pair(core) => format!("pair, core {core} b₀"),
+        let flow = match self.core_b0 {
+            None => "wake".into(),
+            Some(core) => format!("pair, core {core} b₀"),
         };
         let noise = if self.noise == NoiseModel::White {
             "white noise"
@@ -182,10 +167,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let sight = Sight::of(context, EARLY_TAU)?;
     let mut all = Vec::new();
     // The pair is observed from the position of the wake.
-    for cases in cases(context).chunk_by(|a, b| a.seen == b.seen) {
-        let sight = match cases[0].seen {
-            Seen::Wake => &sight,
-            Seen::Pair(core) => &Sight::of_pair(VortexPair {
+    for cases in cases(context).chunk_by(|a, b| a.core_b0 == b.core_b0) {
+        let sight = match cases[0].core_b0 {
+            None => &sight,
+            Some(core) => &Sight::of_pair(VortexPair {
                 core_radius_m: core * VortexPair::default().spacing_m,
                 ..VortexPair::default()
             }),
@@ -202,7 +187,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             zones.extend(p.regions(&case));
         }
     }
-    out.add("batches.csv", &batches(&zones), &origin)?;
+    out.add("batches.csv", &Table::stack(zones)?, &origin)?;
     out.values = vec![scans.to_string(), sight.words];
     out.marks = vec![sight.mark, "analytic pair".into()];
     for snr_db in [WEAK_DB, STRONG_DB] {
@@ -262,7 +247,10 @@ fn table(all: &[Measured]) -> Table {
     Table::new()
         .text("case", column(&cases, |case| case.name()))
         .float("snr_db", column(&cases, |case| case.snr_db))
-        .float("core_b0", column(&cases, |case| case.core_b0()))
+        .float(
+            "core_b0",
+            column(&cases, |case| case.core_b0.unwrap_or(f64::NAN)),
+        )
         .text("zone", zones)
         .text("against", against)
         .float("rms_pa_m_s", rms_pa_m_s)
@@ -288,7 +276,7 @@ fn picture(all: &[Measured]) -> Figure {
     }
     let cores = all
         .iter()
-        .filter(|m| matches!(m.case.seen, Seen::Pair(_)) && m.case.snr_db == CHAPTER_DB)
+        .filter(|m| m.case.core_b0.is_some() && m.case.snr_db == CHAPTER_DB)
         .collect();
     let cores = [("pair, band noise, one pulse a line".into(), cores)];
     let by_snr = |case: &Case| case.snr_db;
@@ -298,7 +286,13 @@ fn picture(all: &[Measured]) -> Figure {
     let beyond = panel("Outside", snr(), outside, by_snr, &along);
     let title = format!("Inside the vortices of the pair, {CHAPTER_DB} dB");
     let core = Axis::linear("core radius [b₀]");
-    let by_core = panel(&title, core, inside, Case::core_b0, &cores);
+    let by_core = panel(
+        &title,
+        core,
+        inside,
+        |case| case.core_b0.unwrap_or(f64::NAN),
+        &cores,
+    );
     Figure::stacked([in_vortices, beyond, by_core])
 }
 

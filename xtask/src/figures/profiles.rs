@@ -5,7 +5,7 @@
 //! estimates, which is taken away.
 
 use super::context::*;
-use super::study::{INSIDE_M, METHODS, NamedZone, OUTSIDE_M, Study, Zone};
+use super::study::{INSIDE_M, METHODS, OUTSIDE_M, Study, Zone};
 use wakescope_sim::measure::cell_average::CellAverage;
 
 /// Lines of sight count that pass a centre within this distance, m.
@@ -117,24 +117,24 @@ impl Profiles {
         near.iter().sum::<f64>() / near.len() as f64
     }
 
-    /// The zones of a named case that claims are about.
-    pub(super) fn regions(&self, case: &str) -> [NamedZone<'_>; 2] {
+    /// The batches of the zones of a named case that claims are about.
+    pub(super) fn regions(&self, case: &str) -> [Table; 2] {
         let case = format!("{}; {case}", self.method);
         [
-            NamedZone::new(&case, "inside", f64::NAN, &self.inside),
-            NamedZone::new(&case, "outside", f64::NAN, &self.outside),
+            self.inside.batches(&case, "inside", f64::NAN),
+            self.outside.batches(&case, "outside", f64::NAN),
         ]
     }
 
-    /// The zones of a named case gate by gate.
-    pub(super) fn gates(&self, case: &str) -> Vec<NamedZone<'_>> {
+    /// The batches of the zones of a named case gate by gate.
+    pub(super) fn gates(&self, case: &str) -> Vec<Table> {
         let case = format!("{}; {case}", self.method);
         let mut zones = Vec::new();
         for zone in &self.evolution {
-            zones.push(NamedZone::new(&case, "evolution", zone.range_m, zone));
+            zones.push(zone.batches(&case, "evolution", zone.range_m));
         }
         for (range_m, zone) in &self.across {
-            zones.push(NamedZone::new(&case, "across", *range_m, zone));
+            zones.push(zone.batches(&case, "across", *range_m));
         }
         zones
     }

@@ -3,6 +3,7 @@
 use super::context::*;
 use crate::statistics::MOST_BATCHES;
 use crate::wakes;
+use std::iter::repeat_n;
 use std::path::PathBuf;
 use wakescope_sim::io::csv::Column;
 use wakescope_sim::measure::cell_average::CellAverage;
@@ -348,56 +349,20 @@ impl Zone {
             self.rms_m_s(without) / other.rms_m_s(without) - 1.0
         })
     }
-}
 
-/// A zone with what names it.
-pub(super) struct NamedZone<'z> {
-    case: String,
-    name: &'static str,
-    /// Its position in the figure.
-    place: f64,
-    zone: &'z Zone,
-}
-
-impl<'z> NamedZone<'z> {
-    pub(super) fn new(case: &str, name: &'static str, place: f64, zone: &'z Zone) -> Self {
-        Self {
-            case: case.into(),
-            name,
-            place,
-            zone,
-        }
+    /// Its batches, from which claims on it follow, with the case and the name of the zone and its position in the figure.
+    pub(super) fn batches(&self, case: &str, name: &str, place: f64) -> Table {
+        let count = self.of_batch.len();
+        let batches = self.of_batch.iter();
+        Table::new()
+            .text("case", repeat_n(case, count))
+            .text("zone", repeat_n(name, count))
+            .float("place", repeat_n(place, count))
+            .float("range_m", repeat_n(self.range_m, count))
+            .int("batch", 0..count as i64)
+            .float("sum_of_squares_m2_s2", batches.clone().map(|(sum, _)| *sum))
+            .int("estimates", batches.map(|(_, count)| *count as i64))
     }
-}
-
-/// The batches of zones, from which claims on them follow.
-pub(super) fn batches(zones: &[NamedZone]) -> Table {
-    let mut case = Vec::new();
-    let mut name = Vec::new();
-    let mut place = Vec::new();
-    let mut range_m = Vec::new();
-    let mut number = Vec::new();
-    let mut sum_m2_s2 = Vec::new();
-    let mut estimates = Vec::new();
-    for named in zones {
-        for (batch, (sum, count)) in named.zone.of_batch.iter().enumerate() {
-            case.push(named.case.clone());
-            name.push(named.name);
-            place.push(named.place);
-            range_m.push(named.zone.range_m);
-            number.push(batch as i64);
-            sum_m2_s2.push(*sum);
-            estimates.push(*count as i64);
-        }
-    }
-    Table::new()
-        .text("case", case)
-        .text("zone", name)
-        .float("place", place)
-        .float("range_m", range_m)
-        .int("batch", number)
-        .float("sum_of_squares_m2_s2", sum_m2_s2)
-        .int("estimates", estimates)
 }
 
 /// Tables of the same columns one below the other, with a last column that tells them apart.
@@ -411,7 +376,7 @@ pub(super) fn stacked(name: &str, parts: Vec<(&str, Table)>) -> Result<Table, Fa
                 Column::Int(v) => v.len(),
                 Column::Text(v) => v.len(),
             });
-        table.text(name, std::iter::repeat_n(label, rows))
+        table.text(name, repeat_n(label, rows))
     });
     Ok(Table::stack(labelled)?)
 }

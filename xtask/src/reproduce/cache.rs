@@ -7,8 +7,8 @@ use crate::cause::cause;
 use crate::figures::context::{Context, Rendered};
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
-use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use toml::Table;
 
 /// What figures come from.
 const DRAWN_BY: [&str; 6] = [
@@ -20,11 +20,8 @@ const DRAWN_BY: [&str; 6] = [
     "Cargo.lock",
 ];
 
-#[derive(Serialize, Deserialize)]
-struct Index {
-    extensions: Vec<String>,
-    rendered: Rendered,
-}
+/// Key of the index that lists the extensions of the files.
+const EXTENSIONS: &str = "extensions";
 
 /// The folder in which a figure is kept.
 pub(super) fn folder(id: &str, context: &Context) -> Result<PathBuf, Failure> {
@@ -38,29 +35,28 @@ pub(super) fn folder(id: &str, context: &Context) -> Result<PathBuf, Failure> {
 /// The figure in a folder, if it was made before and can be read.
 pub(super) fn load(id: &str, folder: &Path) -> Option<Rendered> {
     let text = std::fs::read_to_string(folder.join("index.toml")).ok()?;
-    let index: Index = toml::from_str(&text).ok()?;
+    let mut index: Table = toml::from_str(&text).ok()?;
+    let extensions: Vec<String> = index.remove(EXTENSIONS)?.try_into().ok()?;
     let mut files = Vec::new();
-    for extension in index.extensions {
+    for extension in extensions {
         let path = folder.join(format!("{id}.{extension}"));
         files.push((extension, std::fs::read(path).ok()?));
     }
     Some(Rendered {
         files,
-        ..index.rendered
+        ..index.try_into().ok()?
     })
 }
 
 /// Keeps a figure in a folder.
 pub(super) fn store(id: &str, folder: &Path, rendered: &Rendered) -> Outcome {
     let mut group = rendered.files_in(folder, id)?;
-    let extensions = rendered
-        .files
-        .iter()
-        .map(|(extension, _)| extension.clone());
-    let index = Index {
-        extensions: extensions.collect(),
-        rendered: rendered.clone(),
-    };
+    let mut extensions = Vec::with_capacity(rendered.files.len());
+    for (extension, _) in &rendered.files {
+        extensions.push(extension.as_str());
+    }
+    let mut index = Table::try_from(rendered)?;
+    index.insert(EXTENSIONS.into(), extensions.into());
     group.add("index.toml", toml::to_string(&index)?)?;
     group.commit()?;
     Ok(())

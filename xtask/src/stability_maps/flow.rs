@@ -217,21 +217,14 @@ fn root(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
 /// Square of kappa h of a wave of two cells.
 const KAPPA2: f64 = 49.0 / 9.0;
 
-/// The directions along which a case is stiff, or its cells are long.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Directions {
-    One,
-    Two,
-}
-
 /// Cells along a direction of the flows that are stiff.
 const STIFF_CELLS: usize = 16;
 
 /// What the first step leaves of the shortest wave, stiff along one direction or two, by Crank-Nicolson.
 pub(super) fn stiff() -> Result<Vec<Panel>, Failure> {
     let cases = [
-        ("Crank-Nicolson, one direction", Directions::One),
-        ("Crank-Nicolson, two directions", Directions::Two),
+        ("Crank-Nicolson, one direction", 1),
+        ("Crank-Nicolson, two directions", 2),
     ];
     let curves = cases.map(|(name, directions)| {
         Curve::new(name, &[1e1, 1e2, 1e3, 1e4, 1e5, 1e6], |viscous| {
@@ -249,11 +242,12 @@ pub(super) fn stiff() -> Result<Vec<Panel>, Failure> {
     }])
 }
 
-/// The shortest wave along y, or along y and z.
-fn stiff_flow(directions: Directions, viscous: f64) -> Result<Flow, Failure> {
-    let across = match directions {
-        Directions::One => Direction::thin(1.0),
-        Directions::Two => Direction::periodic(STIFF_CELLS, 0.0, 1.0),
+/// The shortest wave along one direction, y, or along two, y and z.
+fn stiff_flow(directions: u32, viscous: f64) -> Result<Flow, Failure> {
+    let across = if directions == 1 {
+        Direction::thin(1.0)
+    } else {
+        Direction::periodic(STIFF_CELLS, 0.0, 1.0)
     };
     let along = Direction::periodic(STIFF_CELLS, 0.0, 1.0);
     let mesh = Mesh::new(Direction::thin(1.0), along, across)?;
@@ -261,9 +255,10 @@ fn stiff_flow(directions: Directions, viscous: f64) -> Result<Flow, Failure> {
     let viscosity_m2_s = viscous / (STIFF_CELLS * STIFF_CELLS) as f64 / step_s;
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
     let (flow, _) = Flow::new(mesh, settings, |[_, y, z]| {
-        let wave_across = match directions {
-            Directions::One => 1.0,
-            Directions::Two => shortest_wave(z),
+        let wave_across = if directions == 1 {
+            1.0
+        } else {
+            shortest_wave(z)
         };
         [shortest_wave(y) * wave_across, 0.0, 0.0]
     })?;
@@ -277,11 +272,8 @@ fn shortest_wave(position: f64) -> f64 {
 }
 
 /// What Crank and Nicolson's factors leave of it. The first step of either scheme is one of Runge-Kutta.
-fn left_by_theory(directions: Directions, viscous: f64) -> f64 {
-    let directions = match directions {
-        Directions::One => 1.0,
-        Directions::Two => 2.0,
-    };
+fn left_by_theory(directions: u32, viscous: f64) -> f64 {
+    let directions = f64::from(directions);
     let mut left = 1.0;
     for (now, last) in STAGES {
         let d = (now + last) * (viscous * KAPPA2);
@@ -295,22 +287,10 @@ pub(super) fn pressure(profile: Profile) -> Result<Vec<Panel>, Failure> {
     let multigrid = PressureMethod::Multigrid;
     let direct = PressureMethod::Direct;
     let cases = [
-        ("multigrid, cells long along y", multigrid, Directions::One),
-        (
-            "multigrid, cells long along x and y",
-            multigrid,
-            Directions::Two,
-        ),
-        (
-            "direct, what it leaves, long along y",
-            direct,
-            Directions::One,
-        ),
-        (
-            "direct, what it leaves, long along x and y",
-            direct,
-            Directions::Two,
-        ),
+        ("multigrid, cells long along y", multigrid, 1),
+        ("multigrid, cells long along x and y", multigrid, 2),
+        ("direct, what it leaves, long along y", direct, 1),
+        ("direct, what it leaves, long along x and y", direct, 2),
     ];
     let curves = cases.map(|(name, pressure, directions)| {
         let aspects = thinned(profile, &[1.0, 1e5], &[1.0, 1e1, 1e2, 1e3, 1e4, 1e5]);
@@ -328,15 +308,8 @@ pub(super) fn pressure(profile: Profile) -> Result<Vec<Panel>, Failure> {
 }
 
 /// The largest residual in three steps of eddies, of the direct solver; of multigrid the largest factor of an iteration.
-fn worst_residual(
-    pressure: PressureMethod,
-    directions: Directions,
-    aspect: f64,
-) -> Result<f64, Failure> {
-    let length_m = match directions {
-        Directions::One => 1.0,
-        Directions::Two => aspect,
-    };
+fn worst_residual(pressure: PressureMethod, directions: u32, aspect: f64) -> Result<f64, Failure> {
+    let length_m = if directions == 1 { 1.0 } else { aspect };
     let mesh = Mesh::new(
         Direction::periodic(8, 0.0, length_m / 6.0),
         Direction::between(48, 0.0, aspect, Wall::Slip, Wall::Slip),
