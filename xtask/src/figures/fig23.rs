@@ -5,7 +5,7 @@ use super::context::*;
 use rayon::prelude::*;
 use std::path::Path;
 use wakescope_sim::run::run;
-use wakescope_sim::wind::{MapWinds, WindOptions, winds_of_map};
+use wakescope_sim::wind::{WindOptions, WindProfiles, winds_of_map};
 use wakescope_sim::write::velocity_map;
 
 /// Dissipation rates \[m²/s³\]: still, moderate and strong turbulence near an airport, and those that `full` adds.
@@ -71,8 +71,8 @@ struct Scans {
 }
 
 impl Scans {
-    fn new(rhi: &MapWinds, cone: &MapWinds) -> Self {
-        let rows = &cone.profiles.rows;
+    fn new(rhi: &WindProfiles, cone: &WindProfiles) -> Self {
+        let rows = &cone.rows;
         let mut squares = Vec::new();
         for (row, true_m_s) in rows.iter().zip(&cone.true_m_s) {
             for (found, true_m_s) in [row.east_m_s, row.north_m_s].into_iter().zip(true_m_s) {
@@ -93,9 +93,9 @@ impl Scans {
 }
 
 /// Mean over heights, which share one layer.
-fn mean_eps23(winds: &MapWinds) -> f64 {
+fn mean_eps23(winds: &WindProfiles) -> f64 {
     let mut eps23 = Vec::new();
-    for row in &winds.profiles.rows {
+    for row in &winds.rows {
         if row.edr_m23_s.is_finite() {
             eps23.push(row.edr_m23_s.powi(2));
         }
@@ -162,7 +162,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 }
 
 /// The winds of one scan.
-fn winds(context: &Context, text: &str, scan: u64) -> Result<MapWinds, Failure> {
+fn winds(context: &Context, text: &str, scan: u64) -> Result<WindProfiles, Failure> {
     let own = Context {
         seed: context.seed + scan,
         ..context.clone()

@@ -9,6 +9,8 @@ pub struct Head {
     pub rate_rad_s: f64,
     /// Acceleration, rad/s^2; infinite for none.
     pub acceleration_rad_s2: f64,
+    /// Time that a line takes beside its pulses, s; the head moves meanwhile.
+    pub dead_time_s: f64,
 }
 
 impl Head {

@@ -19,19 +19,6 @@ pub struct Mount {
     pub reference_rad: (f64, f64),
 }
 
-/// What paces a scan.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pace {
-    /// Time between pulses, s.
-    pub prt_s: f64,
-    /// Pulses of a line.
-    pub pulses: usize,
-    /// The head.
-    pub head: Head,
-    /// Time that a line takes beside its pulses, s; the head moves meanwhile.
-    pub dead_time_s: f64,
-}
-
 /// One line of sight: pulses that one spectrum comes from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
@@ -104,12 +91,18 @@ impl Schedule {
         modes
     }
 
-    /// The lines of stops and ways, one after the other.
+    /// The lines of stops and ways, one after the other, with a time between pulses, s, and as many pulses of a line as a stop does not
+    /// state otherwise.
     ///
     /// # Errors
     /// The index of a stop that the head cannot reach in the time that it asks for, and why.
-    pub fn new(stops: &[Stop], pace: &Pace, mount: Mount) -> Result<Self, (usize, String)> {
-        let prt_s = pace.prt_s;
+    pub fn new(
+        stops: &[Stop],
+        prt_s: f64,
+        pulses: usize,
+        head: &Head,
+        mount: Mount,
+    ) -> Result<Self, (usize, String)> {
         let mut scan = Self {
             lines: Vec::new(),
             sweeps: Vec::new(),
@@ -120,9 +113,9 @@ impl Schedule {
         let mut last: Option<(f64, Angles, Angles)> = None;
         for (i, stop) in stops.iter().enumerate() {
             let from = stop.angles_rad;
-            let pulses = stop.pulses.unwrap_or(pace.pulses);
-            let (lines, periods, rate_rad_s) = way(stop, pulses, pace);
-            let head_s = last.map_or(0.0, |(_, at, _)| pace.head.time_s(apart_rad(at, from)));
+            let pulses = stop.pulses.unwrap_or(pulses);
+            let (lines, periods, rate_rad_s) = way(stop, pulses, prt_s, head);
+            let head_s = last.map_or(0.0, |(_, at, _)| head.time_s(apart_rad(at, from)));
             let tick = match (stop.time_s, last) {
                 (None, None) => 0.0,
                 (None, Some((end, _, moving))) => {
@@ -131,8 +124,8 @@ impl Schedule {
                         .zip(rate_rad_s)
                         .any(|(before, now)| before * now < 0.0);
                     let least_s = match stop.to_rad {
-                        None => pace.dead_time_s,
-                        Some(_) if turns => pace.head.turn_round_s(),
+                        None => head.dead_time_s,
+                        Some(_) if turns => head.turn_round_s(),
                         Some(_) => 0.0,
                     };
                     // The first pulse of the clock that is not before the head is there.
@@ -314,18 +307,18 @@ impl Schedule {
 }
 
 /// Lines of a stop or a way, how many periods of the pulses the head is on it, and its rate, rad/s.
-fn way(stop: &Stop, pulses: usize, pace: &Pace) -> (usize, f64, Angles) {
+fn way(stop: &Stop, pulses: usize, prt_s: f64, head: &Head) -> (usize, f64, Angles) {
     let Some(to) = stop.to_rad else {
         return (1, pulses as f64, [0.0; 2]);
     };
     let turn_rad = difference(stop.angles_rad, to);
     let length_rad = turn_rad.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
-    let way_s = length_rad / pace.head.rate_rad_s;
-    let lines = (way_s / (pulses as f64 * pace.prt_s) + 1e-9) as usize;
+    let way_s = length_rad / head.rate_rad_s;
+    let lines = (way_s / (pulses as f64 * prt_s) + 1e-9) as usize;
     (
         lines,
-        way_s / pace.prt_s,
-        turn_rad.map(|d| d / length_rad * pace.head.rate_rad_s),
+        way_s / prt_s,
+        turn_rad.map(|d| d / length_rad * head.rate_rad_s),
     )
 }
 

@@ -1,7 +1,7 @@
 //! Beams against tables of independent origin.
 
 use super::path::{self, Angles, Stop, SweepMode};
-use super::schedule::{Mount, Pace, Schedule};
+use super::schedule::{Mount, Schedule};
 use super::{Direction, Head};
 use crate::io::csv_input::TextTable;
 use wakescope_les::winds::Linear;
@@ -47,14 +47,10 @@ const HERE: Mount = Mount {
     reference_rad: (0.0, 0.0),
 };
 
-fn pace(prf_hz: f64, pulses: usize, rate_rad_s: f64, acceleration_rad_s2: f64) -> Pace {
-    Pace {
-        prt_s: 1.0 / prf_hz,
-        pulses,
-        head: Head {
-            rate_rad_s,
-            acceleration_rad_s2,
-        },
+fn head(rate_rad_s: f64, acceleration_rad_s2: f64) -> Head {
+    Head {
+        rate_rad_s,
+        acceleration_rad_s2,
         dead_time_s: 0.0,
     }
 }
@@ -116,12 +112,8 @@ fn a_lidar_that_flies_sees_its_own_speed() {
                 [row("azimuth_rad"), row("elevation_rad")],
             )
         };
-        let scan = Schedule::new(
-            &[stop],
-            &pace(400.0, 1, f64::INFINITY, f64::INFINITY),
-            mount,
-        )
-        .unwrap();
+        let jumping = head(f64::INFINITY, f64::INFINITY);
+        let scan = Schedule::new(&[stop], 1.0 / 400.0, 1, &jumping, mount).unwrap();
         let beam = scan.beam(0, 0.0);
         near(beam.position_m[0], -1500.0 + 70.0 * row("time_s"));
         let mut v = [[0.0; 3]];
@@ -141,16 +133,10 @@ fn a_lidar_that_flies_sees_its_own_speed() {
 #[test]
 fn the_head_takes_the_time_of_the_table() {
     for row in rows("head_motion") {
-        let head = Head {
-            rate_rad_s: row("speed_rad_s"),
-            acceleration_rad_s2: row("acceleration_rad_s2"),
-        };
+        let head = head(row("speed_rad_s"), row("acceleration_rad_s2"));
         near(head.time_s(row("angle_rad")), row("time_s"));
     }
-    let jumps = Head {
-        rate_rad_s: f64::INFINITY,
-        acceleration_rad_s2: f64::INFINITY,
-    };
+    let jumps = head(f64::INFINITY, f64::INFINITY);
     assert_eq!((jumps.time_s(1.0), jumps.turn_round_s()), (0.0, 0.0));
 }
 
@@ -165,16 +151,13 @@ fn numbered<const N: usize>(sweeps: [Vec<Stop>; N]) -> Vec<Stop> {
 #[test]
 fn sweeps_back_and_forth_have_the_pulses_of_the_table() {
     for row in rows("back_and_forth") {
-        let pace = pace(
-            row("prf_hz"),
-            row("pulses_per_line") as usize,
-            row("rate_rad_s"),
-            row("acceleration_rad_s2"),
-        );
+        let head = head(row("rate_rad_s"), row("acceleration_rad_s2"));
         let up = path::rhi(1.0, row("low_rad"), row("high_rad"), 1.0, true);
         let mut down = up.clone();
         path::reverse(&mut down);
-        let scan = Schedule::new(&numbered([up.clone(), down, up]), &pace, HERE).unwrap();
+        let stops = numbered([up.clone(), down, up]);
+        let pulses = row("pulses_per_line") as usize;
+        let scan = Schedule::new(&stops, 1.0 / row("prf_hz"), pulses, &head, HERE).unwrap();
         let sweep = row("sweep") as usize;
         let lines: Vec<usize> = (0..scan.lines.len())
             .filter(|line| scan.lines[*line].sweep == sweep)
@@ -204,7 +187,8 @@ fn smeared(
         to_rad: Some(to),
         ..Stop::new(SweepMode::Sector, from)
     };
-    let scan = Schedule::new(&[sweep], &pace(prf_hz, pulses, speed, f64::INFINITY), mount).unwrap();
+    let head = head(speed, f64::INFINITY);
+    let scan = Schedule::new(&[sweep], 1.0 / prf_hz, pulses, &head, mount).unwrap();
     let seen: Vec<f64> = (0..pulses)
         .map(|pulse| {
             let beam = scan.beam(0, pulse as f64);
@@ -317,7 +301,7 @@ fn each_kind_of_scan_has_its_lines_in_order() {
         "{first:?} {second:?}"
     );
     let cycles = numbered([path::dbs(1.0), path::dbs(1.0)]);
-    let dbs = Schedule::new(&cycles, &pace(1000.0, 100, 1.0, f64::INFINITY), HERE).unwrap();
+    let dbs = Schedule::new(&cycles, 1e-3, 100, &head(1.0, f64::INFINITY), HERE).unwrap();
     assert_eq!(dbs.lines.len(), 10);
     // A quarter turn at 1 rad/s between slanted beams: 1571 periods after the 100 pulses of the first.
     assert_eq!(dbs.lines[1].tick, 1671.0);
@@ -338,8 +322,8 @@ fn stops_that_the_head_cannot_reach_are_named() {
         time_s: Some(time_s),
         ..Stop::new(SweepMode::Sector, [azimuth_rad, 0.1])
     };
-    let pace = pace(100.0, 50, 1.0, f64::INFINITY);
-    let scan = |stops: &[Stop]| Schedule::new(stops, &pace, HERE);
+    let head = head(1.0, f64::INFINITY);
+    let scan = |stops: &[Stop]| Schedule::new(stops, 0.01, 50, &head, HERE);
     assert_eq!(
         scan(&[stop(0.0, 0.0), stop(1.0, 0.5)]).unwrap().lines[1].tick,
         100.0

@@ -75,9 +75,9 @@ const SIGNALS: &str = "it holds raw signals: `wakescope estimate` makes velociti
 
 pub(super) fn wind(args: &WindArgs, cli: &Cli) -> Result<(), Error> {
     cli.refuse_idle("wind", OF_WINDS)?;
-    let cross_wind = match &args.wind {
-        Some(word) => cross_wind(word)?,
-        None => CrossWind::Unknown,
+    let cross_winds = match &args.wind {
+        Some(word) => cross_winds(word)?,
+        None => Vec::new(),
     };
     args.folder.prepare(cli, |files| list(None, files))?;
     let observer = cli.observer();
@@ -105,7 +105,7 @@ pub(super) fn wind(args: &WindArgs, cli: &Cli) -> Result<(), Error> {
         height_step_m: args.height_step,
         layer_m: args.layer,
         outer_scale_m: args.outer_scale,
-        cross_wind,
+        cross_winds,
         ..WindOptions::default()
     };
     let scene = add_gate(&mut options, &sweeps, args.gate_std, &*observer)?;
@@ -129,7 +129,7 @@ pub(super) fn wind(args: &WindArgs, cli: &Cli) -> Result<(), Error> {
 }
 
 /// Wind of a command line: two numbers, or a table.
-fn cross_wind(word: &str) -> Result<CrossWind, Error> {
+fn cross_winds(word: &str) -> Result<Vec<CrossWind>, Error> {
     if Path::new(word)
         .extension()
         .is_some_and(|extension| extension == "csv")
@@ -138,7 +138,7 @@ fn cross_wind(word: &str) -> Result<CrossWind, Error> {
     }
     let (east, north) = horizontal_wind(word)
         .map_err(|allowed| Error::input(Path::new("--wind"), format!("{word:?}: {allowed}")))?;
-    Ok(CrossWind::Uniform([east, north]))
+    Ok(vec![CrossWind::uniform([east, north])])
 }
 
 /// Adds the weight of the gates: as stated, or that of the first file, whose scene comes back if it has one.

@@ -16,20 +16,22 @@ use std::path::Path;
 /// Name of the group of arrays in the folder of a data set.
 pub const GROUP: &str = "scans.zarr";
 
-/// Which part of a data set a flight belongs to, with all of its scans.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-#[cfg_attr(feature = "cli", value(rename_all = "snake_case"))]
-pub enum Split {
-    /// To train methods with.
-    Train,
-    /// To choose between methods with.
-    Validation,
-    /// Flights at the sites of the training.
-    TestHome,
-    /// Flights at sites that are in no other split.
-    TestAway,
+crate::keys::choice! {
+    /// Which part of a data set a flight belongs to, with all of its scans.
+    #[derive(PartialOrd, Ord, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+    #[cfg_attr(feature = "cli", value(rename_all = "snake_case"))]
+    Split {
+        /// To train methods with.
+        Train = "train",
+        /// To choose between methods with.
+        Validation = "validation",
+        /// Flights at the sites of the training.
+        TestHome = "test_home",
+        /// Flights at sites that are in no other split.
+        TestAway = "test_away",
+    }
 }
 
 impl Split {
@@ -45,17 +47,6 @@ impl Split {
     #[must_use]
     pub fn is_test(self) -> bool {
         matches!(self, Self::TestHome | Self::TestAway)
-    }
-
-    /// The name that files and options have for it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Train => "train",
-            Self::Validation => "validation",
-            Self::TestHome => "test_home",
-            Self::TestAway => "test_away",
-        }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::measure::accumulation::{Pulses, lags_per_window, of_pulses};
 use crate::measure::error_law::{ErrorLaw, ScanErrors, shared_cells};
 use crate::measure::gate_estimates::GateSums;
-use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints, WindowSums};
+use crate::measure::map_estimator::{MapEstimator, PointNoise, WindowSums};
 use crate::measure::ray_information::range_filter;
 use crate::measure::region::places;
 use crate::measure::scan::products::LineDraws;
@@ -115,7 +115,7 @@ struct Mapper<'p, S> {
     estimator: MapEstimator<'p, S>,
     places: ScanGeometry,
     points: Vec<PolarPoint>,
-    noise: NoiseAtPoints,
+    noise: Vec<PointNoise>,
     /// The truth, the first realisation, and the errors of each.
     map: VelocityEstimates,
     errors: ErrorMap<ndarray::Ix2>,

@@ -33,6 +33,10 @@ pub(crate) struct MapEstimator<'p, S> {
 /// Sums over the windows of a scan.
 pub(crate) type WindowSums<'a, S> = ScanSums<'a, S, dyn Statistic<S>>;
 
+/// What noise alone gives at a point: the density in the band, A^2, that it exceeds with the probability of the scene, NaN without a test,
+/// and the standard deviation of the power in the band over its mean.
+pub(crate) type PointNoise = (f64, f64);
+
 /// Where the windows of records at some elevations, rad, are in a plane.
 ///
 /// # Errors
@@ -93,7 +97,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         &self,
         scan: &Scan,
         points: &[PolarPoint],
-        noise: &NoiseAtPoints,
+        noise: &[PointNoise],
     ) -> Result<Vec<GateEstimate>, Error> {
         let found = scan.map(points, &self.radius, None, &*self.tools.estimator)?;
         let gates = points
@@ -121,6 +125,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
             .collect::<Result<Vec<_>, Error>>()?;
         let held = |(index, (found, point)): (usize, (MapPoint, &PolarPoint))| {
             let ((radius_m, correlation), e) = (&of_gates[index % gates], &found.estimate);
+            let (threshold, deviation) = noise[index];
             GateEstimate {
                 found: MapPoint {
                     n_eff: scan.n_eff(*point, *radius_m, correlation),
@@ -132,8 +137,8 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
                     f64::NAN
                 },
                 gain: self.tools.noise.gain(e.velocity_m_s),
-                detection_ratio: e.detection / noise.threshold[index],
-                deviation: noise.deviation[index],
+                detection_ratio: e.detection / threshold,
+                deviation,
             }
         };
         Ok(found
@@ -144,17 +149,14 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
             .collect())
     }
 
-    /// What noise gives at points of a scan.
+    /// What noise gives at each of some points of a scan.
     pub(crate) fn noise(
         &self,
         places: &ScanGeometry,
         points: &[PolarPoint],
-    ) -> Result<NoiseAtPoints, Error> {
+    ) -> Result<Vec<PointNoise>, Error> {
         let Some(test) = &self.tools.test else {
-            return Ok(NoiseAtPoints {
-                threshold: vec![f64::NAN; points.len()],
-                deviation: vec![0.0; points.len()],
-            });
+            return Ok(vec![(f64::NAN, 0.0); points.len()]);
         };
         let region = |point: &PolarPoint| {
             Ok(test.region_at(places, *point, self.radius.at_m(point.range_m)?))
@@ -169,13 +171,8 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         } else {
             vec![f64::NAN; points.len()]
         };
-        Ok(NoiseAtPoints {
-            threshold,
-            deviation: regions
-                .iter()
-                .map(|at| test.band_deviation(at.n_eff))
-                .collect(),
-        })
+        let deviations = regions.iter().map(|at| test.band_deviation(at.n_eff));
+        Ok(threshold.into_iter().zip(deviations).collect())
     }
 
     /// Densities, A^2, that noise exceeds with the rate of false alarms; NaN where there is no window.
@@ -192,12 +189,4 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         };
         regions.iter().map(of).collect()
     }
-}
-
-/// What noise alone gives at each point of a map.
-pub(crate) struct NoiseAtPoints {
-    /// Density in the band, A^2, that noise exceeds with the probability of the scene; NaN without a test.
-    threshold: Vec<f64>,
-    /// Standard deviation of the power in the band over its mean.
-    deviation: Vec<f64>,
 }

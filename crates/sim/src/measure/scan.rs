@@ -6,7 +6,7 @@ use crate::measure::efficiency_model::{drawn_turbulence, stretches};
 use crate::measure::profile::{EfficiencyMemo, LineOptics, efficiency_by_theory};
 use crate::plan::geometry::Geometry;
 use crate::plan::instrument::Instrument;
-use crate::plan::line_wind::{LineWind, known_velocity_m_s, wind_along, wind_of_line};
+use crate::plan::line_wind::{known_velocity_m_s, velocity_along_m_s, wind_of_line};
 use crate::plan::wind::SceneWind;
 use crate::plan::{Plan, Stage};
 use crate::progress::{Observer, Silent};
@@ -84,15 +84,14 @@ impl ScanAir {
             Ok(air)
         };
         let winds = in_time_order(&wind, &all, |line| geometry.line_time_s[*line], of_line)?;
-        let lines: Vec<LineOfSight> = winds
-            .iter()
-            .enumerate()
-            .map(|(line, air)| line_of_sight(&weights_per_m[plan.air_of_line(line)], air, geometry))
-            .collect();
-        let spreads: Option<Vec<&[f64]>> = winds
-            .iter()
-            .map(|wind| wind.spread_m_s.as_deref())
-            .collect();
+        let mut lines = Vec::with_capacity(winds.len());
+        let mut spreads = Vec::with_capacity(winds.len());
+        for (line, (velocity_m_s, spread_m_s)) in winds.into_iter().enumerate() {
+            let weight_per_m = &weights_per_m[plan.air_of_line(line)];
+            lines.push(line_of_sight(weight_per_m, velocity_m_s, geometry));
+            spreads.push(spread_m_s);
+        }
+        let spreads: Option<Vec<Vec<f64>>> = spreads.into_iter().collect();
         let shape = (lines.len(), geometry.gate_range_m.len());
         let spread_m_s =
             spreads.and_then(|values| Array2::from_shape_vec(shape, values.concat()).ok());
@@ -192,11 +191,8 @@ impl<'a> Scanner<'a> {
             observer,
         };
         let radial_velocity_m_s = vec![0.0; plan.geometry.layers];
-        let still = LineWind {
-            radial_velocity_m_s,
-            spread_m_s: None,
-        };
-        let line = line_of_sight(&layer_returns(&optics)?, &still, &plan.geometry);
+        let returns = layer_returns(&optics)?;
+        let line = line_of_sight(&returns, radial_velocity_m_s, &plan.geometry);
         Ok(layer_snr(plan.scene(), &plan.instrument, &line))
     }
 
@@ -311,10 +307,10 @@ impl<'a> Scanner<'a> {
             .map(|pulse| (schedule.line_of(pulse), schedule.beam_of_pulse(pulse)))
             .collect();
         let along = |(line, beam): &(usize, Beam)| {
-            let along = wind_along(self.plan, &air.wind, beam, &ranges_m)?;
+            let velocity_m_s = velocity_along_m_s(self.plan, &air.wind, beam, &ranges_m)?;
             let geometry = &self.plan.geometry;
             let weight_per_m = &self.weights_per_m[self.plan.air_of_line(*line)];
-            Ok(line_of_sight(weight_per_m, &along, geometry))
+            Ok(line_of_sight(weight_per_m, velocity_m_s, geometry))
         };
         in_time_order(&air.wind, &beams, |(_, beam)| beam.time_s, along)
     }
@@ -365,12 +361,16 @@ pub(crate) fn median_snr(layer_snr: &[(f64, f64)]) -> f64 {
     all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// A line of sight through some air whose layers return `weight_per_m`.
-fn line_of_sight(weight_per_m: &[f64], air: &LineWind, geometry: &Geometry) -> LineOfSight {
+/// A line of sight through air of that radial velocity, m/s, whose layers return `weight_per_m`.
+fn line_of_sight(
+    weight_per_m: &[f64],
+    radial_velocity_m_s: Vec<f64>,
+    geometry: &Geometry,
+) -> LineOfSight {
     LineOfSight {
         first_range_m: geometry.first_layer_range_m,
         layer_thickness_m: geometry.layer_thickness_m,
-        radial_velocity_m_s: air.radial_velocity_m_s.clone(),
+        radial_velocity_m_s,
         weight_per_m: weight_per_m.to_vec(),
     }
 }

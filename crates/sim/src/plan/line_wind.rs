@@ -11,15 +11,6 @@ use crate::scene::{Outside, WindOfPulses};
 use wakescope_les::winds::SampledLine;
 use wakescope_signal::RangeFilter;
 
-/// The air of the layers along a beam.
-pub(crate) struct LineWind {
-    /// Radial velocity, m/s; NaN where nothing returns light.
-    pub(crate) radial_velocity_m_s: Vec<f64>,
-    /// Of a line whose pulses have winds of their own, the standard deviation of what they see at the gates through the filter of the
-    /// pulse, m/s.
-    pub(crate) spread_m_s: Option<Vec<f64>>,
-}
-
 /// Mean velocity that a filter sees at the gates, m/s.
 ///
 /// # Errors
@@ -39,19 +30,21 @@ pub(crate) fn weighted_at_gates_m_s(
     Ok(out)
 }
 
-/// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have winds of their own.
+/// Radial velocity, m/s, at ranges, m, in the middle of a line; NaN where nothing returns light. If its pulses have winds of their own,
+/// the mean over them, and the standard deviation, m/s, of what they see at the gates through the filter of the pulse.
 pub(crate) fn wind_of_line(
     plan: &Plan,
     wind: &SceneWind,
     filter: &RangeFilter,
     range_m: &[f64],
     line: usize,
-) -> Result<LineWind, Error> {
+) -> Result<(Vec<f64>, Option<Vec<f64>>), Error> {
     let g = &plan.geometry;
     let schedule = &g.schedule;
     let pulses = schedule.lines[line].pulses;
     if plan.scene().scan.wind_of_pulses == WindOfPulses::default() {
-        return wind_along(plan, wind, &schedule.middle(line), range_m);
+        let here_m_s = velocity_along_m_s(plan, wind, &schedule.middle(line), range_m)?;
+        return Ok((here_m_s, None));
     }
     let mut sums_m_s = vec![0.0; range_m.len()];
     let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
@@ -59,16 +52,15 @@ pub(crate) fn wind_of_line(
     let mut first_seen_m_s = Vec::new();
     let share = 1.0 / pulses as f64;
     for pulse in 0..pulses {
-        let here = wind_along(plan, wind, &schedule.beam(line, pulse as f64), range_m)?;
-        let here_seen_m_s = weighted_at_gates_m_s(filter, g, &here.radial_velocity_m_s)?;
+        let beam = schedule.beam(line, pulse as f64);
+        let here_m_s = velocity_along_m_s(plan, wind, &beam, range_m)?;
+        let here_seen_m_s = weighted_at_gates_m_s(filter, g, &here_m_s)?;
         // About the first air, so that the mean of equal winds is that wind.
         if pulse == 0 {
-            (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), here_seen_m_s.clone());
+            first_m_s = here_m_s.clone();
+            first_seen_m_s = here_seen_m_s.clone();
         }
-        for (sum, (v, first)) in sums_m_s
-            .iter_mut()
-            .zip(here.radial_velocity_m_s.iter().zip(&first_m_s))
-        {
+        for (sum, (v, first)) in sums_m_s.iter_mut().zip(here_m_s.iter().zip(&first_m_s)) {
             *sum += share * (v - first);
         }
         for ((sum, square), (v, first)) in sums
@@ -85,10 +77,7 @@ pub(crate) fn wind_of_line(
     }
     let spread = |(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt();
     let spread_m_s = Some(sums.into_iter().map(spread).collect());
-    Ok(LineWind {
-        radial_velocity_m_s: sums_m_s,
-        spread_m_s,
-    })
+    Ok((sums_m_s, spread_m_s))
 }
 
 /// Radial velocity, m/s, positive away from the lidar, at ranges along the middle of line of sight `line`; NaN where nothing
@@ -99,24 +88,11 @@ pub(crate) fn radial_velocity_m_s(
     line: usize,
     range_m: &[f64],
 ) -> Result<Vec<f64>, Error> {
-    velocity_along(plan, wind, &plan.geometry.schedule.middle(line), range_m)
-}
-
-/// The air along a beam.
-pub(crate) fn wind_along(
-    plan: &Plan,
-    wind: &SceneWind,
-    beam: &Beam,
-    range_m: &[f64],
-) -> Result<LineWind, Error> {
-    Ok(LineWind {
-        radial_velocity_m_s: velocity_along(plan, wind, beam, range_m)?,
-        spread_m_s: None,
-    })
+    velocity_along_m_s(plan, wind, &plan.geometry.schedule.middle(line), range_m)
 }
 
 /// [`known_velocity_m_s`] with what the scene says of places where the flow is not known.
-fn velocity_along(
+pub(crate) fn velocity_along_m_s(
     plan: &Plan,
     wind: &SceneWind,
     beam: &Beam,

@@ -3,7 +3,7 @@
 
 use crate::Error;
 use crate::beams::path::{self, Stop};
-use crate::beams::schedule::{Pace, Schedule};
+use crate::beams::schedule::Schedule;
 use crate::beams::{Head, Mount};
 use crate::io::scan_list;
 use crate::keys::Problem;
@@ -19,13 +19,10 @@ pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
     let scene = &file.content;
     let s = &scene.scan;
     let head = &scene.scan.head;
-    let pace = Pace {
-        prt_s: 1.0 / scene.laser.pulse_repetition_hz,
-        pulses: s.pulses_per_line,
-        head: Head {
-            rate_rad_s: head.rate_rad_s,
-            acceleration_rad_s2: head.acceleration_rad_s2,
-        },
+    let prt_s = 1.0 / scene.laser.pulse_repetition_hz;
+    let head = Head {
+        rate_rad_s: head.rate_rad_s,
+        acceleration_rad_s2: head.acceleration_rad_s2,
         dead_time_s: head.dead_time_s,
     };
     let of_key = Error::of_key("scan.pattern.file");
@@ -37,13 +34,15 @@ pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
         // Only a list asks for times, which may be too early.
         _ => (stops(scene), PathBuf::new()),
     };
-    let scan = Schedule::new(&stops, &pace, mount(scene)).map_err(|(i, reason)| {
-        let time_s = stops.get(i).and_then(|stop| stop.time_s).unwrap_or(0.0);
-        of_key(Error::Input {
-            path,
-            reason: format!("row {}: time_s = {time_s:?}: {reason}", i + 1),
-        })
-    })?;
+    let scan = Schedule::new(&stops, prt_s, s.pulses_per_line, &head, mount(scene)).map_err(
+        |(i, reason)| {
+            let time_s = stops.get(i).and_then(|stop| stop.time_s).unwrap_or(0.0);
+            of_key(Error::Input {
+                path,
+                reason: format!("row {}: time_s = {time_s:?}: {reason}", i + 1),
+            })
+        },
+    )?;
     above_ground(file, &scan)?;
     Ok(scan)
 }

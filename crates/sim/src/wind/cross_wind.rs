@@ -9,20 +9,8 @@ use crate::io::csv_input::TextTable;
 use std::path::Path;
 
 /// Wind across beams of which the direction shows none.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub enum CrossWind {
-    /// It is not known.
-    #[default]
-    Unknown,
-    /// East and north, m/s, at all heights.
-    Uniform([f64; 2]),
-    /// Winds of windows and heights.
-    Profile(Vec<KnownWind>),
-}
-
-/// A wind of a profile.
 #[derive(Debug, Clone, PartialEq)]
-pub struct KnownWind {
+pub struct CrossWind {
     /// Middle of its window, if it has a date.
     time: Option<UtcTime>,
     height_m: f64,
@@ -31,11 +19,21 @@ pub struct KnownWind {
 }
 
 impl CrossWind {
+    /// One wind, east and north, m/s, for all times and heights.
+    #[must_use]
+    pub fn uniform(wind_m_s: [f64; 2]) -> Self {
+        Self {
+            time: None,
+            height_m: 0.0,
+            wind_m_s,
+        }
+    }
+
     /// The winds of a `wind.csv`.
     ///
     /// # Errors
     /// A table that cannot be read, without the columns of a wind, or without a row that has one.
-    pub fn read(path: &Path) -> Result<Self, Error> {
+    pub fn read(path: &Path) -> Result<Vec<Self>, Error> {
         let table = TextTable::read(path)?;
         let column = |name: &str| {
             let reason =
@@ -59,53 +57,41 @@ impl CrossWind {
             let time = first
                 .zip(last)
                 .map(|(first, last)| first.after_s(0.5 * last.seconds_since(first)));
-            known.push(KnownWind {
+            known.push(Self {
                 time,
                 height_m,
                 wind_m_s,
             });
         }
         match known.is_empty() {
-            false => Ok(Self::Profile(known)),
+            false => Ok(known),
             true => Err(Error::input(
                 path,
                 "it has no row with an east and a north wind",
             )),
         }
     }
+}
 
-    /// Whether there is a wind.
-    #[must_use]
-    pub fn is_known(&self) -> bool {
-        *self != Self::Unknown
-    }
-
-    /// The wind of a window at a height, east, north, up, m/s: of a profile that of the nearest window, there of the nearest height.
-    pub(super) fn at(
-        &self,
-        window: &Window,
-        reference: Option<UtcTime>,
-        height_m: f64,
-    ) -> Option<[f64; 3]> {
-        let [east, north] = match self {
-            Self::Unknown => return None,
-            Self::Uniform(wind_m_s) => *wind_m_s,
-            Self::Profile(known) => {
-                let middle_s = 0.5 * (window.start_s + window.end_s);
-                let middle = reference.map(|date| date.after_s(middle_s));
-                let away = |wind: &KnownWind| {
-                    let both = wind.time.zip(middle);
-                    let away_s = both.map_or(0.0, |(a, b)| a.seconds_since(b).abs());
-                    (away_s, (wind.height_m - height_m).abs())
-                };
-                let nearest = known.iter().min_by(|a, b| {
-                    let a = away(a);
-                    let b = away(b);
-                    a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
-                });
-                nearest?.wind_m_s
-            }
-        };
-        Some([east, north, 0.0])
-    }
+/// The wind of a window at a height, east, north, up, m/s: of some winds that of the nearest window, there of the nearest height.
+pub(super) fn nearest_m_s(
+    known: &[CrossWind],
+    window: &Window,
+    reference: Option<UtcTime>,
+    height_m: f64,
+) -> Option<[f64; 3]> {
+    let middle_s = 0.5 * (window.start_s + window.end_s);
+    let middle = reference.map(|date| date.after_s(middle_s));
+    let away = |wind: &CrossWind| {
+        let both = wind.time.zip(middle);
+        let away_s = both.map_or(0.0, |(a, b)| a.seconds_since(b).abs());
+        (away_s, (wind.height_m - height_m).abs())
+    };
+    let nearest = known.iter().min_by(|a, b| {
+        let a = away(a);
+        let b = away(b);
+        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+    let [east_m_s, north_m_s] = nearest?.wind_m_s;
+    Some([east_m_s, north_m_s, 0.0])
 }

@@ -2,8 +2,6 @@
 //!
 //! Check: cones, stares, a scan in elevation, a sector near the horizon.
 
-use std::fmt;
-
 /// Beams within this angle of the vertical count as vertical, and beams of one plane agree in azimuth to it.
 const SAME_PLANE_DEG: f64 = 2.0;
 /// Beams within this angle are one direction.
@@ -11,28 +9,18 @@ const SAME_DIRECTION_DEG: f64 = 0.5;
 /// Largest standard deviation of a component that is determined, for a deviation of 1 of each velocity.
 const LARGEST_UNIT_STD: f64 = 5.0;
 
-/// Which components a wind has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum Kind {
-    /// East, north and up.
-    Full,
-    /// Along one azimuth and up.
-    Plane,
-    /// Up.
-    Up,
-    /// Along one beam.
-    Radial,
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Full => "full",
-            Self::Plane => "plane",
-            Self::Up => "up",
-            Self::Radial => "radial",
-        })
+crate::keys::choice! {
+    /// Which components a wind has.
+    #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+    Kind {
+        /// East, north and up.
+        Full = "full",
+        /// Along one azimuth and up.
+        Plane = "plane",
+        /// Up.
+        Up = "up",
+        /// Along one beam.
+        Radial = "radial",
     }
 }
 
@@ -123,31 +111,15 @@ pub(super) fn components(directions: &[[f64; 3]]) -> Option<Components> {
     })
 }
 
-/// Components of one height.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Determined {
-    /// All are.
-    All,
-    /// All but the vertical one are.
-    WithoutUp,
-    /// Others are not.
-    None,
-}
-
 impl Components {
-    /// Which components velocities in these directions determine.
-    pub(super) fn determined_by(&self, directions: &[[f64; 3]]) -> Determined {
+    /// The axes along which velocities in these directions determine the wind: all, all but the vertical one, or none.
+    pub(super) fn determined_by(&self, directions: &[[f64; 3]]) -> &[[f64; 3]] {
         if are_determined(&self.axes, directions) {
-            return Determined::All;
+            return &self.axes;
         }
         match self.axes.split_last() {
-            Some((last, level)) if *last == UP && !level.is_empty() => {
-                match are_determined(level, directions) {
-                    true => Determined::WithoutUp,
-                    false => Determined::None,
-                }
-            }
-            _ => Determined::None,
+            Some((last, level)) if *last == UP && are_determined(level, directions) => level,
+            _ => &[],
         }
     }
 }
@@ -198,38 +170,29 @@ mod tests {
         [level * east, level * north, up]
     }
 
-    fn kind(directions: &[[f64; 3]]) -> (Kind, Determined) {
+    fn kind(directions: &[[f64; 3]]) -> (Kind, usize) {
         let directions = distinct(directions.iter().copied());
         let found = components(&directions).unwrap();
-        (found.kind, found.determined_by(&directions))
+        (found.kind, found.determined_by(&directions).len())
     }
 
     #[test]
     fn directions_tell_which_components_there_are() {
         let cone: Vec<_> = (0..12).map(|i| beam(30.0 * f64::from(i), 60.0)).collect();
-        assert_eq!(kind(&cone), (Kind::Full, Determined::All));
+        assert_eq!(kind(&cone), (Kind::Full, 3));
         let flat: Vec<_> = (0..12).map(|i| beam(10.0 * f64::from(i), 1.0)).collect();
-        assert_eq!(kind(&flat), (Kind::Full, Determined::WithoutUp));
+        assert_eq!(kind(&flat), (Kind::Full, 2));
         let rhi: Vec<_> = (0..12).map(|i| beam(45.0, 3.0 * f64::from(i))).collect();
-        assert_eq!(kind(&rhi), (Kind::Plane, Determined::All));
+        assert_eq!(kind(&rhi), (Kind::Plane, 2));
         let over: Vec<_> = [30.0, 90.0, 150.0]
             .map(|elevation| beam(45.0, elevation))
             .into();
-        assert_eq!(kind(&over), (Kind::Plane, Determined::All));
+        assert_eq!(kind(&over), (Kind::Plane, 2));
         let flat_rhi: Vec<_> = (0..4).map(|i| beam(45.0, f64::from(i))).collect();
-        assert_eq!(kind(&flat_rhi), (Kind::Plane, Determined::WithoutUp));
-        assert_eq!(
-            kind(&[beam(0.0, 90.0), beam(20.0, 89.0)]),
-            (Kind::Up, Determined::All)
-        );
-        assert_eq!(kind(&[beam(33.0, 30.0)]), (Kind::Radial, Determined::All));
-        assert_eq!(
-            kind(&[beam(0.0, 30.0), beam(90.0, 30.0)]),
-            (Kind::Full, Determined::WithoutUp)
-        );
-        assert_eq!(
-            kind(&[beam(0.0, 3.0), beam(4.0, 3.0)]),
-            (Kind::Full, Determined::None)
-        );
+        assert_eq!(kind(&flat_rhi), (Kind::Plane, 1));
+        assert_eq!(kind(&[beam(0.0, 90.0), beam(20.0, 89.0)]), (Kind::Up, 1));
+        assert_eq!(kind(&[beam(33.0, 30.0)]), (Kind::Radial, 1));
+        assert_eq!(kind(&[beam(0.0, 30.0), beam(90.0, 30.0)]), (Kind::Full, 2));
+        assert_eq!(kind(&[beam(0.0, 3.0), beam(4.0, 3.0)]), (Kind::Full, 0));
     }
 }

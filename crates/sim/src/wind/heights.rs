@@ -3,7 +3,7 @@
 //! Check: `wind` in the tests of the program.
 
 use super::WindOptions;
-use super::directions::{Components, Determined, dot};
+use super::directions::{Components, dot};
 use crate::Error;
 use crate::io::scans::Ray;
 use ndarray::{Array2, s};
@@ -295,11 +295,10 @@ fn wind_of(
 ) -> Result<BinWind, Error> {
     let own = &bins[number].cells;
     let directions: Vec<[f64; 3]> = own.iter().map(|cell| cell.direction).collect();
-    let axes = match components.determined_by(&directions) {
-        Determined::All => components.axes.clone(),
-        Determined::WithoutUp => components.axes[..components.axes.len() - 1].to_vec(),
-        Determined::None => return Ok(BinWind::Undetermined),
-    };
+    let axes = components.determined_by(&directions).to_vec();
+    if axes.is_empty() {
+        return Ok(BinWind::Undetermined);
+    }
     let stack = stacked(bins, number);
     let count = axes.len();
     let rows = stack.rows(&axes);

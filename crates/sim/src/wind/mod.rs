@@ -28,7 +28,7 @@ pub use cross_wind::CrossWind;
 pub use directions::Kind;
 pub use netcdf::netcdf;
 pub(crate) use of_map::gate_stride;
-pub use of_map::{MapWinds, table_with_truth, winds_of_map};
+pub use of_map::{table_with_truth, winds_of_map};
 #[cfg(feature = "plots")]
 pub use pictures::figure;
 pub use rows::{Flag, WindRow};
@@ -40,6 +40,7 @@ pub use windows::{Every, FoundWindows, Window, windows};
 use crate::Error;
 use crate::io::UtcTime;
 use crate::io::scans::Ray;
+use cross_wind::nearest_m_s;
 use directions::{Components, components, distinct, is_vertical};
 use heights::{Bin, winds};
 use turbulence::{RunTurbulence, layers};
@@ -59,8 +60,8 @@ pub struct WindOptions {
     pub layer_m: f64,
     /// Outer scale of the turbulence, m; by default from the velocities.
     pub outer_scale_m: Option<f64>,
-    /// Wind across beams of which the direction shows none.
-    pub cross_wind: CrossWind,
+    /// Winds across beams of which the direction shows none; none where these are not known.
+    pub cross_winds: Vec<CrossWind>,
 }
 
 impl Default for WindOptions {
@@ -72,7 +73,7 @@ impl Default for WindOptions {
             height_step_m: None,
             layer_m: 100.0,
             outer_scale_m: None,
-            cross_wind: CrossWind::Unknown,
+            cross_winds: Vec::new(),
         }
     }
 }
@@ -86,6 +87,9 @@ pub struct WindProfiles {
     pub reference: Option<UtcTime>,
     /// Outer scales, m, and their probabilities; none without turbulence.
     pub outer_scales: Vec<(f64, f64)>,
+    /// Of a simulated scan, the true wind (east, north, up) above the lidar at the height and in the middle of the window of each row, m/s,
+    /// without the turbulence of `"eddies"`: the mean wind is what a scan is to find. NaN where it is not known.
+    pub true_m_s: Vec<[f64; 3]>,
 }
 
 /// Half the band of bad velocities is at least this, m/s.
@@ -125,7 +129,7 @@ pub fn wind_profiles(
             options,
             |height_m, mean_m_s| {
                 carried_m_s(components.kind, mean_m_s, || {
-                    options.cross_wind.at(window, reference, height_m)
+                    nearest_m_s(&options.cross_winds, window, reference, height_m)
                 })
             },
         ));
@@ -137,7 +141,7 @@ pub fn wind_profiles(
     }
     let turbulence = RunTurbulence::new(&all_layers, options)?;
     let mut rows = Vec::new();
-    let is_known = options.cross_wind.is_known();
+    let is_known = !options.cross_winds.is_empty();
     for (number, components, bins) in &fitted {
         let of = (*number, &windows[*number], components);
         for bin in bins {
@@ -148,6 +152,7 @@ pub fn wind_profiles(
         rows,
         reference,
         outer_scales: turbulence.outer_scales,
+        true_m_s: Vec::new(),
     })
 }
 
@@ -227,7 +232,7 @@ fn components_of(rays: &[Ray], kind: Option<Kind>) -> Result<Components, Error> 
             };
             Err(of_kind(&format!(
                 "{has}: {needed}; what they determine is {}",
-                found.kind
+                found.kind.name()
             )))
         }
         _ => Ok(found),

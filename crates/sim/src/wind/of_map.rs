@@ -13,16 +13,6 @@ use crate::scene::Scene;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use std::f64::consts::FRAC_PI_2;
 
-/// Winds of a scan and of the air.
-#[derive(Debug, Clone, Default)]
-pub struct MapWinds {
-    /// What the velocities of the first realisation tell.
-    pub profiles: WindProfiles,
-    /// True wind (east, north, up) above the lidar at the height and in the middle of the window of each row, m/s, without the turbulence
-    /// of `"eddies"`: the mean wind is what a scan is to find. NaN where it is not known.
-    pub true_m_s: Vec<[f64; 3]>,
-}
-
 impl WindOptions {
     /// The gates of a scene.
     ///
@@ -50,7 +40,8 @@ pub(crate) fn gate_stride(scene: &Scene) -> usize {
     (samples / estimator.gate_step_samples.max(1) as f64).ceil() as usize
 }
 
-/// The winds of a scan, as far as its beams determine them; a window for each sweep. The options of its own scene are
+/// The winds of the first realisation of a scan, as far as its beams determine them, and the true ones; a window for each sweep. The
+/// options of its own scene are
 /// [`WindOptions::of_scene`].
 ///
 /// # Errors
@@ -59,11 +50,11 @@ pub fn winds_of_map(
     plan: &Plan,
     map: &VelocityMap,
     options: &WindOptions,
-) -> Result<MapWinds, Error> {
+) -> Result<WindProfiles, Error> {
     let (windows, reference, _) = windows(ray_sweeps(&plan.geometry.schedule, map), Every::Sweep)?;
-    let profiles = wind_profiles(&windows, reference, options)?;
-    let true_m_s = true_winds_m_s(plan, map, &windows, &profiles)?;
-    Ok(MapWinds { profiles, true_m_s })
+    let mut profiles = wind_profiles(&windows, reference, options)?;
+    profiles.true_m_s = true_winds_m_s(plan, map, &windows, &profiles)?;
+    Ok(profiles)
 }
 
 /// The lines of sight of the first realisation.
@@ -129,8 +120,8 @@ fn true_winds_m_s(
 
 /// The table of winds with the true ones.
 #[must_use]
-pub fn table_with_truth(winds: &MapWinds) -> Table {
-    let mut all = table(&winds.profiles);
+pub fn table_with_truth(winds: &WindProfiles) -> Table {
+    let mut all = table(winds);
     for (axis, name) in ["east", "north", "up"].into_iter().enumerate() {
         let values: Vec<f64> = winds.true_m_s.iter().map(|wind| wind[axis]).collect();
         all = all.float(&format!("{name}_true_m_s"), values);

@@ -8,7 +8,6 @@ use super::turbulence::{LayerTurbulence, RunTurbulence};
 use super::windows::Window;
 use crate::Error;
 use ndarray::Array2;
-use std::fmt;
 use wakescope_estimate::Measured;
 
 /// Standard deviation of a vertical wind that is taken as 0, m/s.
@@ -20,39 +19,25 @@ const ABOVE_ZERO: f64 = 2.0;
 /// Probability of an outer scale at an end of those tried from which on it is to be known.
 const AT_EDGE: f64 = 0.5;
 
-/// What is to be known of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Flag {
-    /// The directions do not determine the vertical wind: it is taken as 0 with a standard deviation of 0.3 m/s.
-    VerticalTakenAsZero,
-    /// Neighbouring heights were fitted together with this one.
-    FewCells,
-    /// The wind across the beam is not known; 5 m/s are assumed for the standard deviations.
-    WindAssumed,
-    /// The dissipation is less than two standard deviations.
-    EdrBelowNoise,
-    /// The outer scale is at an end of those that are tried.
-    OuterScaleAtEdge,
-    /// Standard deviations are those of the residuals: there is no dissipation.
-    ResidualError,
-    /// The velocities are noise.
-    Noise,
-    /// The directions do not determine the wind.
-    Undetermined,
-}
-
-impl fmt::Display for Flag {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::VerticalTakenAsZero => "vertical_taken_as_zero",
-            Self::FewCells => "few_cells",
-            Self::WindAssumed => "wind_assumed",
-            Self::EdrBelowNoise => "edr_below_noise",
-            Self::OuterScaleAtEdge => "outer_scale_at_edge",
-            Self::ResidualError => "residual_error",
-            Self::Noise => "noise",
-            Self::Undetermined => "undetermined",
-        })
+crate::keys::choice! {
+    /// What is to be known of a row.
+    Flag {
+        /// The directions do not determine the vertical wind: it is taken as 0 with a standard deviation of 0.3 m/s.
+        VerticalTakenAsZero = "vertical_taken_as_zero",
+        /// Neighbouring heights were fitted together with this one.
+        FewCells = "few_cells",
+        /// The wind across the beam is not known; 5 m/s are assumed for the standard deviations.
+        WindAssumed = "wind_assumed",
+        /// The dissipation is less than two standard deviations.
+        EdrBelowNoise = "edr_below_noise",
+        /// The outer scale is at an end of those that are tried.
+        OuterScaleAtEdge = "outer_scale_at_edge",
+        /// Standard deviations are those of the residuals: there is no dissipation.
+        ResidualError = "residual_error",
+        /// The velocities are noise.
+        Noise = "noise",
+        /// The directions do not determine the wind.
+        Undetermined = "undetermined",
     }
 }
 

@@ -35,7 +35,7 @@ pub(super) fn date(reference: Option<UtcTime>, time_s: f64) -> String {
 
 /// The flags of a row in one text.
 fn flags(flags: &[Flag]) -> String {
-    let names: Vec<String> = flags.iter().map(Flag::to_string).collect();
+    let names: Vec<&str> = flags.iter().map(|flag| flag.name()).collect();
     names.join(" ")
 }
 
@@ -53,7 +53,7 @@ pub fn table(profiles: &WindProfiles) -> Table {
         .text("start_utc", dates(|row| row.start_s))
         .text("end_utc", dates(|row| row.end_s))
         .float("height_m", numbers(|row| row.height_m))
-        .text("kind", rows.iter().map(|row| row.kind.to_string()))
+        .text("kind", rows.iter().map(|row| row.kind.name()))
         .float("azimuth_deg", numbers(|row| row.azimuth_deg))
         .float("elevation_deg", numbers(|row| row.elevation_deg));
     for (name, unit, of) in COMPONENTS {
@@ -130,7 +130,7 @@ pub fn json(profiles: &WindProfiles, options: &WindOptions) -> Value {
     for row in &profiles.rows {
         let mut object = json!({
             "window": row.window, "start_utc": date(profiles.reference, row.start_s), "end_utc": date(profiles.reference, row.end_s),
-            "height_m": row.height_m, "kind": row.kind.to_string(), "flags": row.flags.iter().map(Flag::to_string).collect::<Vec<_>>(),
+            "height_m": row.height_m, "kind": row.kind.name(), "flags": row.flags.iter().map(|flag| flag.name()).collect::<Vec<_>>(),
             "edr_m23_s": row.edr_m23_s, "edr_low_m23_s": row.edr_low_m23_s, "edr_high_m23_s": row.edr_high_m23_s,
         });
         if row.has_wind() {
@@ -150,7 +150,7 @@ pub fn json(profiles: &WindProfiles, options: &WindOptions) -> Value {
         .collect();
     json!({
         "options": {
-            "gate_std_m": options.gate_std_m, "kind": options.kind.map(|kind| kind.to_string()),
+            "gate_std_m": options.gate_std_m, "kind": options.kind.map(|kind| kind.name()),
             "height_step_m": options.height_step_m, "layer_m": options.layer_m, "outer_scale_m": options.outer_scale_m,
         },
         "outer_scales": outer_scales, "winds": rows,

@@ -8,7 +8,7 @@ use crate::measure::profile::RangeProfile;
 use crate::plan::Plan;
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 use crate::scene::SnrReference;
-use crate::wind::{MapWinds, WindRow};
+use crate::wind::{WindProfiles, WindRow};
 use wakescope_les::winds::Vortex;
 use wakescope_optics::EfficiencyProfile;
 
@@ -92,7 +92,7 @@ fn efficiency_curve(
 pub(super) fn map(
     plan: &Plan,
     map: &VelocityMap,
-    winds: Option<&MapWinds>,
+    winds: Option<&WindProfiles>,
 ) -> Result<Figure, Error> {
     let centres_m = centres_m(plan);
     let sweep = if plan.geometry.schedule.is_plane() {
@@ -208,7 +208,7 @@ fn lines(plan: &Plan, map: &VelocityMap) -> Figure {
 }
 
 /// Radial velocity over azimuth at the middle range of the first sweep, with the sine curve of its wind.
-fn azimuth_display(plan: &Plan, map: &VelocityMap, winds: &MapWinds) -> Figure {
+fn azimuth_display(plan: &Plan, map: &VelocityMap, winds: &WindProfiles) -> Figure {
     let gate = map.range_m.len() / 2;
     let x = Axis::linear("azimuth [degrees]");
     let mut plot = CurvePlot::new("", x, Axis::linear("radial velocity [m/s]"));
@@ -245,12 +245,16 @@ fn azimuth_display(plan: &Plan, map: &VelocityMap, winds: &MapWinds) -> Figure {
 }
 
 /// The wind of the first sweep at the height of a gate of its first line.
-fn wind_of_gate<'w>(winds: &'w MapWinds, map: &VelocityMap, gate: usize) -> Option<&'w WindRow> {
+fn wind_of_gate<'w>(
+    winds: &'w WindProfiles,
+    map: &VelocityMap,
+    gate: usize,
+) -> Option<&'w WindRow> {
     let first = map.rays.first()?;
     let height_m = map.range_m.get(gate)? * first.elevation_rad.sin();
     let mut nearest_m = f64::INFINITY;
     let mut nearest = None;
-    for row in &winds.profiles.rows {
+    for row in &winds.rows {
         let from_m = (row.height_m - height_m).abs();
         if row.window == 1 && row.has_wind() && from_m < nearest_m {
             nearest_m = from_m;

@@ -252,11 +252,11 @@ fn vad_and_dbs_of_a_scan_determine_the_wind_with_its_standard_errors() {
             &WindOptions::of_scene(plan.scene()).unwrap(),
         );
         let winds = found.unwrap();
-        assert_eq!(winds.profiles.rows.len(), 2 * map.range_m.len());
+        assert_eq!(winds.rows.len(), 2 * map.range_m.len());
         // White noise on the beams of a cone, in the horizontal components.
         let sigma_m_s = map.std_m_s.mean().unwrap();
         let expected_m_s = sigma_m_s * (2.0 / beams).sqrt() / 1.1f64.cos();
-        for (i, (row, true_m_s)) in winds.profiles.rows.iter().zip(&winds.true_m_s).enumerate() {
+        for (i, (row, true_m_s)) in winds.rows.iter().zip(&winds.true_m_s).enumerate() {
             let range_m = map.range_m[i % map.range_m.len()];
             assert!((row.height_m - range_m * 1.1f64.sin()).abs() < 1e-6);
             let found = [row.east_m_s, row.north_m_s, row.up_m_s];
