@@ -1,6 +1,6 @@
 //! What can go wrong in a run.
 
-use crate::keys::SceneError;
+use crate::keys::{Problem, SceneError};
 use std::path::PathBuf;
 
 /// Why a run could not be made or finished.
@@ -166,29 +166,10 @@ pub enum Error {
     },
 }
 
-/// A field of its input that a library refuses.
-pub(crate) struct RefusedField {
-    /// Its name, with the index of the element of a list.
-    pub(crate) name: String,
-    /// The value found.
-    pub(crate) value: String,
-    /// What is allowed.
-    pub(crate) allowed: String,
-}
-
-impl RefusedField {
-    fn number(name: impl Into<String>, value: f64, allowed: &str) -> Self {
-        Self {
-            name: name.into(),
-            value: format!("{value:?}"),
-            allowed: allowed.into(),
-        }
-    }
-}
-
 impl Error {
-    /// The field that a library refuses, if the error is about one.
-    pub(crate) fn refused_field(&self) -> Option<RefusedField> {
+    /// What a library refuses of a field of its input, if the error is about one: as its key the name of the field, with the index of the
+    /// element of a list.
+    pub(crate) fn refused_field(&self) -> Option<Problem> {
         use wakescope_estimate::Error as EstimateError;
         use wakescope_les::Error as WindError;
         use wakescope_optics::Error as OpticsError;
@@ -213,28 +194,26 @@ impl Error {
                 field,
                 value,
                 allowed,
-            }) => Some(RefusedField::number(*field, *value, allowed)),
+            }) => Some(Problem::new(*field, format!("{value:?}"), *allowed)),
             Self::Signal(SignalError::ElementOutOfRange {
                 field,
                 index,
                 value,
                 allowed,
-            }) => Some(RefusedField::number(
+            }) => Some(Problem::new(
                 format!("{field}[{index}]"),
-                *value,
-                allowed,
+                format!("{value:?}"),
+                *allowed,
             )),
             Self::Signal(SignalError::LengthMismatch {
                 field,
                 found,
                 expected,
-            }) => Some(RefusedField {
-                name: (*field).into(),
-                value: format!("a list of {found}"),
-                allowed: format!(
-                    "a list of {expected} values, as many as the lists beside it have"
-                ),
-            }),
+            }) => Some(Problem::new(
+                *field,
+                format!("a list of {found}"),
+                format!("a list of {expected} values, as many as the lists beside it have"),
+            )),
             _ => None,
         }
     }

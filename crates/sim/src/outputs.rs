@@ -21,17 +21,15 @@ pub(crate) struct Outputs {
     files: Vec<(String, Vec<u8>)>,
 }
 
-/// What adds the files of a list.
-pub(crate) trait List: FnOnce(&mut Outputs) -> Result<(), Error> {}
-
-impl<T: FnOnce(&mut Outputs) -> Result<(), Error>> List for T {}
-
 impl Outputs {
     /// The names of a list.
     ///
     /// # Errors
     /// What the list finds before it makes a file.
-    pub(crate) fn names(formats: Formats, list: impl List) -> Result<Vec<String>, Error> {
+    pub(crate) fn names(
+        formats: Formats,
+        list: impl FnOnce(&mut Self) -> Result<(), Error>,
+    ) -> Result<Vec<String>, Error> {
         Ok(Self::contents(formats, None, list)?
             .into_iter()
             .map(|(name, _)| name)
@@ -46,7 +44,7 @@ impl Outputs {
         folder: &Path,
         existing: Existing,
         of: (Formats, Provenance),
-        list: impl List,
+        list: impl FnOnce(&mut Self) -> Result<(), Error>,
     ) -> Result<Vec<PathBuf>, Error> {
         write_contents(folder, Self::contents(of.0, Some(of.1), list)?, existing)
     }
@@ -58,7 +56,7 @@ impl Outputs {
     pub(crate) fn contents(
         formats: Formats,
         origin: Option<Provenance>,
-        list: impl List,
+        list: impl FnOnce(&mut Self) -> Result<(), Error>,
     ) -> Result<Vec<(String, Vec<u8>)>, Error> {
         let mut outputs = Self {
             formats,

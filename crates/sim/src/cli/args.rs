@@ -10,7 +10,7 @@ use crate::io::{Existing, Provenance};
 use crate::measure::recorded::{
     self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra,
 };
-use crate::outputs::{List, Outputs};
+use crate::outputs::Outputs;
 use crate::plan::{Plan, Target};
 use crate::progress::{Observer, Silent};
 use crate::scene::SceneFile;
@@ -39,7 +39,11 @@ impl FolderArgs {
     }
 
     /// Finds out whether the files of a list can be written.
-    pub(super) fn prepare(&self, cli: &Cli, list: impl List) -> Result<(), Error> {
+    pub(super) fn prepare(
+        &self,
+        cli: &Cli,
+        list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         self.prepare_names(cli, &Outputs::names(scene::Outputs::default(), list)?)
     }
 
@@ -53,7 +57,7 @@ impl FolderArgs {
         &self,
         cli: &Cli,
         of: (scene::Outputs, Provenance),
-        list: impl List,
+        list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
         (mut object, text): (Value, String),
     ) -> Result<(), Error> {
         let files = cli.write(&self.out, self.existing(), of, list)?;

@@ -94,7 +94,7 @@ pub(super) fn budget(
     }
     let mut object = json!({
         "version": crate::VERSION, "scene_hash": plan.file.hash, "range_m": found.range_m, "rows": found.rows,
-        "limits": found.limits.values.iter().copied().collect::<BTreeMap<_, _>>(), "warnings": found.warnings, "files": paths(&files),
+        "limits": found.limits.iter().copied().collect::<BTreeMap<_, _>>(), "warnings": found.warnings, "files": paths(&files),
     });
     state_air(&plan, &mut object);
     cli.say(&object, &text)

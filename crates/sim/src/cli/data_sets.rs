@@ -58,17 +58,11 @@ pub(super) fn data_set_of(data: &[PathBuf]) -> Result<Option<&Path>, Error> {
     }
 }
 
-/// What a method found in scans of a data set.
-pub(super) struct Found {
-    /// By flight and scan.
-    scans: Vec<(usize, usize, PredictedScan)>,
-    flights: usize,
-    /// The plan of the data set.
-    pub(super) origin: Provenance,
-}
+/// What a method found in a scan of a data set, with the numbers of flight and scan.
+type Found = (usize, usize, PredictedScan);
 
 /// Applies a method to the scans of each flight of some splits, read as a format says; the scene of the flight is that of one scan of the instrument in
-/// still air.
+/// still air. Returns what it found, flight after flight, and the plan of the data set.
 ///
 /// # Errors
 /// A data set that is damaged or has another plan beside it; a split without ready flights; what the method refuses.
@@ -78,7 +72,7 @@ pub(super) fn predict(
     format: &ScanFormat,
     (stage, observer): (Stage, &dyn Observer),
     method: impl Fn(usize, &SceneFile, Vec<ReadScan>) -> Result<Vec<PredictedScan>, Error> + Sync,
-) -> Result<Found, Error> {
+) -> Result<(Vec<Found>, Provenance), Error> {
     let data_set = DataSet::open(folder)?;
     data_set.check_splits(splits)?;
     let path = folder.join(PLAN);
@@ -114,11 +108,7 @@ pub(super) fn predict(
             scans.push((*flight, scan, found));
         }
     }
-    Ok(Found {
-        scans,
-        flights: flights.len(),
-        origin,
-    })
+    Ok((scans, origin))
 }
 
 /// What is said of a scan of a flight that a method refuses.
@@ -126,21 +116,18 @@ pub(super) fn without_wake(flight: usize, scan: usize, error: &Error) -> String 
     format!("flight {flight}, scan {scan}: {error}: taken for a scan without a wake")
 }
 
-impl Found {
-    /// For people and as an object.
-    pub(super) fn report(&self) -> (Value, String) {
-        let scans = self.scans.len();
-        let found = self.scans.iter();
-        let wakes = found.filter(|(.., scan)| !scan.vortices.is_empty()).count();
-        let flights = self.flights;
-        let text = format!("vortices in {wakes} of {scans} scans of {flights} flights\n");
-        let object =
-            json!({ "flights": flights, "scan_count": scans, "scans_with_vortices": wakes });
-        (object, text)
-    }
+/// What was found, for people and as an object.
+pub(super) fn report(found: &[Found]) -> (Value, String) {
+    let scans = found.len();
+    let wakes = found.iter().filter(|(.., scan)| !scan.vortices.is_empty());
+    let wakes = wakes.count();
+    let flights = found.chunk_by(|a, b| a.0 == b.0).count();
+    let text = format!("vortices in {wakes} of {scans} scans of {flights} flights\n");
+    let object = json!({ "flights": flights, "scan_count": scans, "scans_with_vortices": wakes });
+    (object, text)
 }
 
 /// The table of predictions; before they are made its name alone.
-pub(super) fn list(stem: &str, found: Option<&Found>, files: &mut Outputs) -> Result<(), Error> {
-    files.table(stem, found, |found| Ok(prediction_table(&found.scans)))
+pub(super) fn list(stem: &str, found: Option<&[Found]>, files: &mut Outputs) -> Result<(), Error> {
+    files.table(stem, found, |found| Ok(prediction_table(found)))
 }

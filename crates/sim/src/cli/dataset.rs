@@ -5,7 +5,7 @@ use super::{Cli, paths};
 use crate::Error;
 use crate::dataset::plan::DatasetPlan;
 use crate::dataset::presets::{PRESETS, preset_plan};
-use crate::dataset::run::{self, Dataset, Forecast, Settings, Summary};
+use crate::dataset::run::{self, Dataset, Settings, Summary};
 use crate::quantities::{bytes, seconds};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
@@ -49,13 +49,12 @@ pub(super) fn dataset(args: &DatasetArgs, cli: &Cli) -> Result<(), Error> {
         return print_scene(&plan, number, cli);
     }
     let dataset = Dataset::new(&plan, args.settings)?;
-    let forecast = dataset.forecast();
     let Some(out) = args.out.as_deref().filter(|_| !args.check) else {
         cli.refuse_idle("--check", BESIDE_CHECKED_PLAN)?;
-        return say_forecast(&plan, &forecast, args.out.as_deref(), cli);
+        return say_forecast(&plan, &dataset, args.out.as_deref(), cli);
     };
     let observer = cli.observer();
-    observer.forecast(&format!("{}\n", text_of(&forecast)));
+    observer.forecast(&format!("{}\n", text_of(&dataset)));
     let summary = dataset.run(out, &*observer)?;
     say_summary(&plan, &summary, out, cli)
 }
@@ -88,25 +87,22 @@ fn print_scene(plan: &DatasetPlan, number: usize, cli: &Cli) -> Result<(), Error
     cli.say(&object, text.trim_end())
 }
 
-fn text_of(forecast: &Forecast) -> String {
-    let Forecast {
-        flights,
-        scans,
-        lines,
-        gates,
-        ..
-    } = forecast;
+fn text_of(dataset: &Dataset<'_>) -> String {
     format!(
-        "{flights} flights of {scans} scans of {lines} lines and {gates} gates: {} on disk, {} of one core, {} of memory",
-        bytes(forecast.bytes),
-        seconds(forecast.core_s),
-        bytes(forecast.memory_bytes)
+        "{} flights of {} scans of {} lines and {} gates: {} on disk, {} of one core, {} of memory",
+        dataset.flights(),
+        dataset.shape.scans,
+        dataset.shape.elevation_deg.len(),
+        dataset.shape.range_m.len(),
+        bytes(dataset.disk_bytes()),
+        seconds(dataset.core_s()),
+        bytes(dataset.memory_bytes())
     )
 }
 
 fn say_forecast(
     plan: &DatasetPlan,
-    forecast: &Forecast,
+    dataset: &Dataset<'_>,
     out: Option<&Path>,
     cli: &Cli,
 ) -> Result<(), Error> {
@@ -114,7 +110,7 @@ fn say_forecast(
         "{}: good, plan {}\n{}",
         plan.path().display(),
         plan.hash,
-        text_of(forecast)
+        text_of(dataset)
     );
     let mut free_bytes = None;
     if let Some(out) = out {
@@ -125,9 +121,9 @@ fn say_forecast(
         text += &format!("; {} are free there", bytes(free));
     }
     let object = json!({
-        "version": crate::VERSION, "plan_hash": plan.hash, "flights": forecast.flights, "scans": forecast.scans,
-        "lines": forecast.lines, "gates": forecast.gates, "bytes": forecast.bytes, "core_s": forecast.core_s,
-        "memory_bytes": forecast.memory_bytes, "free_bytes": free_bytes,
+        "version": crate::VERSION, "plan_hash": plan.hash, "flights": dataset.flights(), "scans": dataset.shape.scans,
+        "lines": dataset.shape.elevation_deg.len(), "gates": dataset.shape.range_m.len(), "bytes": dataset.disk_bytes(),
+        "core_s": dataset.core_s(), "memory_bytes": dataset.memory_bytes(), "free_bytes": free_bytes,
     });
     cli.say(&object, &text)
 }

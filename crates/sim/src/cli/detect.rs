@@ -156,16 +156,16 @@ fn of_data_set(args: &DetectArgs, folder: &Path, cli: &Cli) -> Result<(), Error>
         .prepare(cli, |files| data_sets::list("detection", None, files))?;
     let observer = cli.observer();
     let splits = args.splits.splits();
-    let found = data_sets::predict(
+    let (found, origin) = data_sets::predict(
         folder,
         &splits,
         &args.scans.format(),
         (Stage::Detection, &*observer),
         |flight, scene, scans| of_flight((args, cli.seed), (flight, scene), scans, &*observer),
     )?;
-    let of = (Default::default(), found.origin.clone());
+    let of = (Default::default(), origin);
     let list = |files: &mut Outputs| data_sets::list("detection", Some(&found), files);
-    args.folder.finish(cli, of, list, found.report())
+    args.folder.finish(cli, of, list, data_sets::report(&found))
 }
 
 /// The best trial wakes of the scans of a flight in which one is found. In a scan that cannot be tested there is none.

@@ -6,9 +6,7 @@ use super::{Cli, paths};
 use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
-use crate::flow::{
-    Begin, CaseFile, CaseKind, FlowOutcome, RunOptions, WakePreset, check_on, example, run_on,
-};
+use crate::flow::{Begin, CaseFile, CaseKind, FlowOutcome, WakePreset, check_on, example, run_on};
 use crate::progress::{Observer, Silent};
 use clap::Args;
 use serde_json::json;
@@ -156,15 +154,11 @@ fn simulate(
         (_, true) => Begin::Overwrite,
         _ => Begin::New,
     };
-    let options = RunOptions {
-        begin,
-        allow_large: args.allow_large,
-    };
     if args.check {
         if !is_first {
             return Ok(());
         }
-        let forecast = check_on(ranks, &file, args.out.as_deref(), options)?;
+        let forecast = check_on(ranks, &file, args.out.as_deref(), begin, args.allow_large)?;
         for text in &forecast.notes {
             cli.observer().warn(text);
         }
@@ -185,7 +179,7 @@ fn simulate(
         not(feature = "plots"),
         expect(unused_mut, reason = "there is nothing to draw with")
     )]
-    let mut outcome = run_on(ranks, &file, out, options, &*observer)?;
+    let mut outcome = run_on(ranks, &file, out, begin, args.allow_large, &*observer)?;
     if !is_first {
         return Ok(());
     }

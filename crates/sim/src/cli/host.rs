@@ -12,7 +12,7 @@ use crate::flow::{CaseFile, WakePreset};
 use crate::io::raw::RawRecords;
 use crate::io::{Existing, Provenance, text_file, write_atomic};
 use crate::keys::{Problem, SceneError};
-use crate::outputs::{self, List, Outputs};
+use crate::outputs::{self, Outputs};
 use crate::progress::{Observer, stoppable};
 use crate::scene::{Outputs as Formats, SceneFile};
 use crate::sweep::{Request, Sweep};
@@ -212,7 +212,7 @@ impl Cli {
         folder: &Path,
         existing: Existing,
         of: (Formats, Provenance),
-        list: impl List,
+        list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
     ) -> Result<Vec<PathBuf>, Error> {
         if !self.keeps_files() {
             return Outputs::write(folder, existing, of, list);

@@ -292,16 +292,16 @@ fn of_data_set(args: &RetrieveArgs, folder: &Path, cli: &Cli) -> Result<(), Erro
         .prepare(cli, |files| data_sets::list("retrieval", None, files))?;
     let observer = cli.observer();
     let splits = args.splits.splits();
-    let found = data_sets::predict(
+    let (found, origin) = data_sets::predict(
         folder,
         &splits,
         &args.scans.format(),
         (Stage::Retrieval, &*observer),
         |flight, scene, scans| of_flight(args, (flight, scene), scans, &*observer),
     )?;
-    let of = (Default::default(), found.origin.clone());
+    let of = (Default::default(), origin);
     let list = |files: &mut Outputs| data_sets::list("retrieval", Some(&found), files);
-    args.folder.finish(cli, of, list, found.report())
+    args.folder.finish(cli, of, list, data_sets::report(&found))
 }
 
 /// The vortices of the scans of a flight, each begun where those before it say that they are. In a scan that cannot be fitted there

@@ -7,7 +7,7 @@ use super::options::WITHOUT_OUTPUT;
 use super::output::paths;
 use crate::io::{Existing, text_file};
 use crate::outputs::Outputs;
-use crate::score::{self, Predictions, Readings, ScoreOptions, Scores, Truth};
+use crate::score::{self, Predictions, ScoreOptions, Scores, Truth};
 use crate::{Error, VERSION};
 use clap::Args;
 use std::path::PathBuf;
@@ -68,9 +68,13 @@ pub(super) fn score(args: &ScoreArgs, cli: &Cli) -> Result<(), Error> {
         files = cli.write(folder, existing, of, |files| list(Some(result), files))?;
         report += &format!("wrote {} files to {}\n", files.len(), folder.display());
     }
-    let readings = Readings::add(&args.data_set, &text, &options.splits);
-    report += &readings.text();
-    object["readings_before"] = readings.before.into();
+    let readings_before = score::add_reading(&args.data_set, &text, &options.splits);
+    if readings_before > 0 {
+        report += &format!(
+            "test splits of this data set were scored with other predictions before: {readings_before}\n"
+        );
+    }
+    object["readings_before"] = readings_before.into();
     object["version"] = VERSION.into();
     object["files"] = paths(&files).into();
     cli.say(&object, &report)

@@ -26,11 +26,6 @@ use wakescope_les::Wind as _;
 /// Numbers of a flight by the names of their arrays.
 type Numbers = BTreeMap<String, Vec<f64>>;
 
-/// The rows of a flight, each with the index of its array.
-pub(super) struct Rows {
-    pub(super) packed: Vec<(usize, Vec<u8>)>,
-}
-
 /// The plan of a flight. Winds are not shared: each flight has its own.
 ///
 /// # Errors
@@ -40,7 +35,7 @@ pub(super) fn planned(scene: &SceneFile, common: &Common) -> Result<Plan, Error>
     Plan::sharing(scene.clone(), Target::Map, wind, &common.efficiencies)
 }
 
-/// Measures a flight, and packs what its arrays hold.
+/// Measures a flight, and packs what its arrays hold: the index of each array, and the bytes of its row.
 ///
 /// # Errors
 /// What a run refuses; a checked plan gives none.
@@ -49,27 +44,11 @@ pub(super) fn rows(
     flight: &Flight,
     arrays: &[Array],
     common: &Common,
-) -> Result<Rows, Error> {
+) -> Result<Vec<(usize, Vec<u8>)>, Error> {
     let plan = planned(&flight.scene, common)?;
     let shape = Shape::new(&plan, of.keys.spectra)?;
     let mut numbers = Numbers::new();
-    let mut add = |name: &str, values: Vec<f64>| drop(numbers.insert(name.into(), values));
-    let measured = Measured::new(&plan, of.keys.spectra, common)?;
-    let map = &measured.map;
-    for (name, cells) in [
-        ("velocity", &map.v_scan_m_s),
-        ("velocity_standard_deviation", &measured.deviation_m_s),
-        ("signal_to_noise_ratio", &map.snr_db),
-        ("spectral_width", &map.width_m_s),
-        ("quality", &map.quality),
-        ("flag", &map.flagged),
-        ("true_velocity", &map.v_gate_m_s),
-        ("point_velocity", &map.v_exact_m_s),
-    ] {
-        add(name, cells.iter().copied().collect());
-    }
-    add("spectrum", measured.spectrum_db);
-    add("snr_middle", vec![measured.snr_middle_db]);
+    add_measured(&plan, of.keys.spectra, common, &mut numbers)?;
     add_truth(of, flight, &plan, &shape, &mut numbers)?;
     let mut packed = Vec::with_capacity(arrays.len());
     for (index, array) in arrays.iter().enumerate() {
@@ -84,7 +63,7 @@ pub(super) fn rows(
         }
         packed.push((index, bytes));
     }
-    Ok(Rows { packed })
+    Ok(packed)
 }
 
 /// The number that the hash of a scene writes in hexadecimal digits.
@@ -92,33 +71,40 @@ fn hash_number(hash: &str) -> u64 {
     u64::from_str_radix(hash, 16).unwrap_or(0)
 }
 
-/// What is measured in a flight.
-struct Measured {
-    map: VelocityEstimates,
-    deviation_m_s: Array2<f64>,
-    spectrum_db: Vec<f64>,
-    snr_middle_db: f64,
-}
-
-impl Measured {
-    fn new(plan: &Plan, has_spectra: bool, common: &Common) -> Result<Self, Error> {
-        let scanner = Scanner::with(plan, &common.efficiencies, &Silent)?;
-        let spectra = has_spectra.then(|| schema::spectra(plan)).transpose()?;
-        let mut spectrum_db = Ok(Vec::new());
-        let maps = map::of_plans(&[plan], &scanner, &Silent, |map| {
-            if let Some(spectra) = &spectra {
-                spectrum_db = spectra_db(spectra, map);
-            }
-        })?;
-        let map = maps.into_iter().next().unwrap_or_default();
-        let middle = ScanMiddle::of(plan, None, Some(&scanner));
-        Ok(Self {
-            deviation_m_s: deviations_m_s(plan, &map, common)?,
-            map,
-            spectrum_db: spectrum_db?,
-            snr_middle_db: middle.map_or(f64::NAN, |middle| middle.snr_db),
-        })
+/// Adds what is measured in a flight.
+fn add_measured(
+    plan: &Plan,
+    has_spectra: bool,
+    common: &Common,
+    numbers: &mut Numbers,
+) -> Result<(), Error> {
+    let scanner = Scanner::with(plan, &common.efficiencies, &Silent)?;
+    let spectra = has_spectra.then(|| schema::spectra(plan)).transpose()?;
+    let mut spectrum_db = Ok(Vec::new());
+    let maps = map::of_plans(&[plan], &scanner, &Silent, |map| {
+        if let Some(spectra) = &spectra {
+            spectrum_db = spectra_db(spectra, map);
+        }
+    })?;
+    let map = maps.into_iter().next().unwrap_or_default();
+    let deviation_m_s = deviations_m_s(plan, &map, common)?;
+    for (name, cells) in [
+        ("velocity", &map.v_scan_m_s),
+        ("velocity_standard_deviation", &deviation_m_s),
+        ("signal_to_noise_ratio", &map.snr_db),
+        ("spectral_width", &map.width_m_s),
+        ("quality", &map.quality),
+        ("flag", &map.flagged),
+        ("true_velocity", &map.v_gate_m_s),
+        ("point_velocity", &map.v_exact_m_s),
+    ] {
+        numbers.insert(name.into(), cells.iter().copied().collect());
     }
+    numbers.insert("spectrum".into(), spectrum_db?);
+    let middle = ScanMiddle::of(plan, None, Some(&scanner));
+    let snr_db = middle.map_or(f64::NAN, |middle| middle.snr_db);
+    numbers.insert("snr_middle".into(), vec![snr_db]);
+    Ok(())
 }
 
 /// Spectra of all gates over the noise, dB \[line, gate, bin\].

@@ -7,7 +7,7 @@
 //! disk and a file in the way are refused.
 
 use super::documents;
-use super::flight::{self, Rows};
+use super::flight;
 use super::plan::{DatasetPlan, Flight};
 use super::schema::{self, Shape};
 use super::{PLAN, STORE};
@@ -54,30 +54,11 @@ pub struct Summary {
     pub kept: usize,
 }
 
-/// What a plan will take.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Forecast {
-    /// Flights, and scans of each.
-    pub flights: usize,
-    /// Scans of each flight.
-    pub scans: usize,
-    /// Lines of a scan.
-    pub lines: usize,
-    /// Gates of a line.
-    pub gates: usize,
-    /// Bytes on disk.
-    pub bytes: f64,
-    /// Run time on one core, to a factor of two, s.
-    pub core_s: f64,
-    /// Memory, bytes.
-    pub memory_bytes: f64,
-}
-
 /// A checked plan, ready to run.
 #[derive(Debug)]
 pub struct Dataset<'p> {
     plan: &'p DatasetPlan,
-    shape: Shape,
+    pub(crate) shape: Shape,
     arrays: Vec<Array>,
     settings: Settings,
     /// Run time of a flight on one core, s, and its memory, bytes.
@@ -125,25 +106,31 @@ impl<'p> Dataset<'p> {
         })
     }
 
-    /// What it will take.
-    pub fn forecast(&self) -> Forecast {
-        let flights = (0..self.plan.keys.chunks())
+    /// Number of flights that are to be run.
+    pub fn flights(&self) -> usize {
+        (0..self.plan.keys.chunks())
             .filter(|chunk| self.is_mine(*chunk))
             .map(|chunk| self.wanted(chunk).len())
-            .sum::<usize>();
+            .sum()
+    }
+
+    /// What they need on disk, bytes.
+    pub fn disk_bytes(&self) -> f64 {
         let cells = self.shape.cells() as f64;
         let spectra = self.shape.bin_velocity_m_s.len() as f64 * SPECTRUM_BYTES;
+        self.flights() as f64 * cells * (CELL_BYTES + spectra)
+    }
+
+    /// Their run time on one core, to a factor of two, s.
+    pub fn core_s(&self) -> f64 {
+        self.flights() as f64 * self.flight_core_s
+    }
+
+    /// Memory of a run, bytes.
+    pub fn memory_bytes(&self) -> f64 {
         let threads = rayon::current_num_threads() as f64;
         let chunk_bytes: usize = self.chunked().map(|(_, array)| array.chunk_bytes()).sum();
-        Forecast {
-            flights,
-            scans: self.shape.scans,
-            lines: self.shape.elevation_deg.len(),
-            gates: self.shape.range_m.len(),
-            bytes: flights as f64 * cells * (CELL_BYTES + spectra),
-            core_s: flights as f64 * self.flight_core_s,
-            memory_bytes: chunk_bytes as f64 + threads * self.flight_bytes,
-        }
+        chunk_bytes as f64 + threads * self.flight_bytes
     }
 
     /// Whether a chunk belongs to the shard.
@@ -315,7 +302,7 @@ impl<'p> Dataset<'p> {
         }
         let first = chunk * self.plan.keys.flights_per_chunk;
         for batch in wanted.chunks(rayon::current_num_threads()) {
-            let rows: Vec<Rows> = batch
+            let rows: Vec<_> = batch
                 .par_iter()
                 .map(|flight| {
                     let rows = self.run_flight(*flight, writer, common)?;
@@ -324,7 +311,7 @@ impl<'p> Dataset<'p> {
                 })
                 .collect::<Result<_, Error>>()?;
             for (flight, rows) in batch.iter().zip(rows) {
-                for (index, bytes) in rows.packed {
+                for (index, bytes) in rows {
                     let Some(at) = chunked.iter().position(|(own, _)| *own == index) else {
                         continue;
                     };
@@ -341,14 +328,19 @@ impl<'p> Dataset<'p> {
         Ok(())
     }
 
-    /// Runs a flight; its spectrum, a file of its own, is written at once.
-    fn run_flight(&self, number: usize, writer: &Writer, common: &Common) -> Result<Rows, Error> {
+    /// Runs a flight; its spectrum, a file of its own, is written at once. Returns the other rows with the indices of their arrays.
+    fn run_flight(
+        &self,
+        number: usize,
+        writer: &Writer,
+        common: &Common,
+    ) -> Result<Vec<(usize, Vec<u8>)>, Error> {
         let flight = self.plan.flight(number)?;
         let rows = flight::rows(self.plan, &flight, &self.arrays, common);
         let mut rows = rows.map_err(|error| refused(self.plan, &flight, error))?;
         let of_spectrum = |(index, _): &(usize, Vec<u8>)| self.arrays[*index].name == "spectrum";
-        if let Some(at) = rows.packed.iter().position(of_spectrum) {
-            let (index, bytes) = rows.packed.swap_remove(at);
+        if let Some(at) = rows.iter().position(of_spectrum) {
+            let (index, bytes) = rows.swap_remove(at);
             let key = self.arrays[index].chunk_key(number);
             writer.put(&key, &compressed(&bytes))?;
         }

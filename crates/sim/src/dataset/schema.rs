@@ -24,15 +24,15 @@ const MISSING: i32 = -32_768;
 
 /// Lines, gates, times and velocities that all flights share.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Shape {
-    pub(super) scans: usize,
-    pub(super) elevation_deg: Vec<f64>,
-    pub(super) azimuth_deg: Vec<f64>,
-    pub(super) range_m: Vec<f64>,
+pub(crate) struct Shape {
+    pub(crate) scans: usize,
+    pub(crate) elevation_deg: Vec<f64>,
+    pub(crate) azimuth_deg: Vec<f64>,
+    pub(crate) range_m: Vec<f64>,
     /// Time of the middle of each line from the first pulse of the flight, s \[scan, line\].
-    pub(super) line_time_s: Vec<f64>,
+    pub(crate) line_time_s: Vec<f64>,
     /// Velocities of the frequencies of a spectrum, m/s; none without spectra.
-    pub(super) bin_velocity_m_s: Vec<f64>,
+    pub(crate) bin_velocity_m_s: Vec<f64>,
 }
 
 impl Shape {

@@ -24,15 +24,6 @@ use wakescope_les::{SubgridModel, TimeStep};
 /// Steps between checkpoints where a case states nothing.
 const STEPS_PER_CHECKPOINT: u64 = 500;
 
-/// How a run begins.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct RunOptions {
-    /// Anew, or from a checkpoint.
-    pub begin: Begin,
-    /// Whether a case is run whose forecast exceeds the memory of the machine.
-    pub allow_large: bool,
-}
-
 /// All that a run needs, found without computing.
 pub(super) type Prepared = (Setup, RunPlan, Files, FlowForecast);
 
@@ -44,13 +35,14 @@ pub fn check_on(
     ranks: &Arc<dyn Ranks>,
     file: &CaseFile,
     folder: Option<&Path>,
-    options: RunOptions,
+    begin: Begin,
+    allow_large: bool,
 ) -> Result<FlowForecast, Error> {
     if let Some(folder) = folder {
-        refuse_folder(folder, options.begin)?;
+        refuse_folder(folder, begin)?;
     }
-    let (setup, _, _, mut forecast) =
-        prepare(file, folder.unwrap_or(Path::new("")), options, ranks)?;
+    let folder = folder.unwrap_or(Path::new(""));
+    let (setup, _, _, mut forecast) = prepare(file, folder, begin, allow_large, ranks)?;
     // A run reports these itself.
     let growth = setup.stability().undamped(forecast.step_s);
     let is_modelled = setup.settings.subgrid != SubgridModel::None;
@@ -70,19 +62,11 @@ pub fn run(
     observer: &dyn Observer,
 ) -> Result<FlowOutcome, Error> {
     let alone = Arc::new(Single) as Arc<dyn Ranks>;
-    run_on(
-        &alone,
-        file,
-        folder,
-        RunOptions {
-            begin,
-            allow_large: false,
-        },
-        observer,
-    )
+    run_on(&alone, file, folder, begin, false, observer)
 }
 
-/// Runs a case on ranks, all of which call this, and writes its files to `folder`, in which no other run may be writing. The
+/// Runs a case on ranks, all of which call this, and writes its files to `folder`, in which no other run may be writing; one whose
+/// forecast exceeds the memory of the machine only with `allow_large`. The
 /// files have the same bytes for any number of ranks; of fields and checkpoints each writes what it has, rank 0 the rest, and it
 /// alone reports to the observer.
 ///
@@ -93,22 +77,23 @@ pub fn run_on(
     ranks: &Arc<dyn Ranks>,
     file: &CaseFile,
     folder: &Path,
-    options: RunOptions,
+    begin: Begin,
+    allow_large: bool,
     observer: &dyn Observer,
 ) -> Result<FlowOutcome, Error> {
     let is_first = ranks.rank() == 0;
     let prepared = if is_first {
-        refuse_folder(folder, options.begin)
+        refuse_folder(folder, begin)
     } else {
         Ok(())
     };
-    let prepared = prepared.and_then(|()| prepare(file, folder, options, ranks));
+    let prepared = prepared.and_then(|()| prepare(file, folder, begin, allow_large, ranks));
     let (mut setup, plan, files, forecast) = agree(ranks, prepared)?;
     let mut warnings = forecast.notes.clone();
     let opened = is_first.then(|| {
-        files.refuse_existing(options.begin)?;
+        files.refuse_existing(begin)?;
         observer.forecast(&forecast.to_string());
-        open(folder, options.begin, &mut warnings)
+        open(folder, begin, &mut warnings)
     });
     let opened = agree(ranks, opened.transpose())?;
     let number = opened.as_ref().map_or(0, |(_, number)| *number);
@@ -274,13 +259,14 @@ fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
 pub(super) fn prepare(
     file: &CaseFile,
     folder: &Path,
-    options: RunOptions,
+    begin: Begin,
+    allow_large: bool,
     ranks: &Arc<dyn Ranks>,
 ) -> Result<Prepared, Error> {
     // Of several ranks each is taken to have a machine of its own.
     let machines = ranks.count() as f64;
     let available = machine::available_memory_bytes()
-        .filter(|_| !options.allow_large)
+        .filter(|_| !allow_large)
         .map(|bytes| bytes * machines);
     // Before the setup, which holds the initial field.
     refuse_too_large(&file.content, file.content.case.cells(), &[], available)?;
@@ -299,11 +285,11 @@ pub(super) fn prepare(
             wakescope_les::Error::TooManyRanks { .. } => Error::Flow(error),
             error => refused_case(file, &error),
         })?;
-    if options.begin != Begin::Restart {
+    if begin != Begin::Restart {
         refuse_unstable(file, &setup)?;
     }
     let (plan, files) = plan(file, &setup, folder)?;
-    plan.check(if options.begin == Begin::Restart {
+    plan.check(if begin == Begin::Restart {
         f64::NEG_INFINITY
     } else {
         0.0

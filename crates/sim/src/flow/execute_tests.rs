@@ -28,12 +28,9 @@ fn vortices(field: &TempDir, viscosity_m2_s: f64, time: &str) -> CaseFile {
     plane_vortices_for_tests::case(field, 16, viscosity_m2_s, &sections)
 }
 
-fn check(
-    file: &CaseFile,
-    folder: Option<&Path>,
-    options: RunOptions,
-) -> Result<FlowForecast, Error> {
-    check_on(&(Arc::new(Single) as Arc<dyn Ranks>), file, folder, options)
+fn check(file: &CaseFile, folder: Option<&Path>, begin: Begin) -> Result<FlowForecast, Error> {
+    let alone = Arc::new(Single) as Arc<dyn Ranks>;
+    check_on(&alone, file, folder, begin, false)
 }
 
 #[test]
@@ -236,7 +233,7 @@ fn a_courant_number_is_checked_against_the_limit_of_its_scheme_mesh_and_viscosit
             "[case]\n{case}\n[time]\nend_s = 0.2\nscheme = \"{scheme}\"\ncourant = {courant:?}\nlongest_step_s = 10.0\n[solver]\n\
              subgrid = {{ model = \"{model}\" }}\n"
         );
-        check(&parse(&text), None, RunOptions::default())
+        check(&parse(&text), None, Begin::New)
     };
     // A uniform flow through a periodic box of 12 cells along each direction.
     let uniform = |viscosity: &str| {
@@ -293,12 +290,7 @@ fn a_courant_number_is_checked_against_the_limit_of_its_scheme_mesh_and_viscosit
         noted.notes
     );
     let long = "[time]\nend_s = 10.0\nscheme = \"adams_bashforth2\"\n";
-    let noted = check(
-        &parse(&format!("[case]\n{thin}\n{long}")),
-        None,
-        RunOptions::default(),
-    )
-    .unwrap();
+    let noted = check(&parse(&format!("[case]\n{thin}\n{long}")), None, Begin::New).unwrap();
     assert!(
         noted.notes.len() == 1 && noted.notes[0].contains("runge_kutta3"),
         "{:?}",
@@ -382,7 +374,7 @@ fn columns_and_texts_of_the_circulation_have_the_radii_of_the_case() {
 #[test]
 fn keys_that_do_nothing_are_told_of() {
     let notes = |case: &str, wake: &str| {
-        check(&tiny_wake(case, wake), None, RunOptions::default())
+        check(&tiny_wake(case, wake), None, Begin::New)
             .unwrap()
             .notes
     };
@@ -405,7 +397,7 @@ fn keys_that_do_nothing_are_told_of() {
     let uneven = parse(
         "[case]\nkind = \"wake\"\ncells = [1, 24, 16]\n[wake]\nend_tau = 0.25\nevery_tau = 0.1\n",
     );
-    let found = check(&uneven, None, RunOptions::default()).unwrap().notes;
+    let found = check(&uneven, None, Begin::New).unwrap().notes;
     assert!(
         found.iter().any(|text| text.contains("every_tau = 0.1")),
         "{found:?}"

@@ -30,7 +30,7 @@ mod wake;
 mod writer;
 
 pub use case::*;
-pub use execute::{RunOptions, check_on, run, run_on};
+pub use execute::{check_on, run, run_on};
 pub use files::FileForecast;
 pub use forecast::FlowForecast;
 pub use free::*;

@@ -1,6 +1,6 @@
 //! Runs on ranks: the files of one process, byte for byte.
 
-use super::execute::{RunOptions, run_on};
+use super::execute::run_on;
 use super::thread_ranks::on_threads;
 use super::{Begin, CaseFile};
 use crate::progress::{Observer, Silent};
@@ -21,12 +21,8 @@ fn wake(more: &str) -> String {
 /// Runs the case; the words of each rank's error, if any.
 fn run(text: &str, folder: &Path, begin: Begin, count: usize) -> Vec<Option<String>> {
     let file = CaseFile::parse(text, Path::new("case.toml")).unwrap();
-    let options = RunOptions {
-        begin,
-        allow_large: false,
-    };
     let run = |ranks| {
-        run_on(&ranks, &file, folder, options, &Silent)
+        run_on(&ranks, &file, folder, begin, false, &Silent)
             .err()
             .map(|e| e.to_string())
     };
@@ -109,11 +105,7 @@ fn an_output_that_one_rank_cannot_write_stops_all_and_leaves_no_part_of_it() {
     let blocked = folder.path().join(name);
     let found = on_threads(3, |ranks| {
         let blocks = Blocks(&blocked);
-        let options = RunOptions {
-            begin: Begin::New,
-            allow_large: false,
-        };
-        run_on(&ranks, &file, folder.path(), options, &blocks)
+        run_on(&ranks, &file, folder.path(), Begin::New, false, &blocks)
             .err()
             .map(|e| e.to_string())
     });

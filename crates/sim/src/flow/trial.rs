@@ -3,7 +3,7 @@
 //! Check: the tests of `accuracy`, which compares them with a closed form.
 
 use super::execute::prepare;
-use super::{CaseFile, CaseKind, RunOptions};
+use super::{Begin, CaseFile, CaseKind};
 use crate::Error;
 use crate::progress::Observer;
 use std::path::Path;
@@ -37,7 +37,7 @@ impl CaseFile {
     /// # Errors
     /// As [`super::check_on`].
     pub(crate) fn with_longer_steps(&self, times: f64) -> Result<(Self, &'static str, f64), Error> {
-        let settings = prepare(self, Path::new(""), RunOptions::default(), &alone())?
+        let settings = prepare(self, Path::new(""), Begin::New, false, &alone())?
             .0
             .settings;
         let mut case = self.content.clone();
@@ -93,13 +93,14 @@ fn alone() -> Arc<dyn Ranks> {
 /// # Errors
 /// What the case refuses; a flow that blows up.
 pub(crate) fn history_of(file: &CaseFile, observer: &dyn Observer) -> Result<History, Error> {
-    let end_s = prepare(file, Path::new(""), RunOptions::default(), &alone())?
+    let end_s = prepare(file, Path::new(""), Begin::New, false, &alone())?
         .3
         .end_s;
     let (mut setup, mut plan, ..) = prepare(
         &file.for_history(end_s),
         Path::new(""),
-        RunOptions::default(),
+        Begin::New,
+        false,
         &alone(),
     )?;
     plan.checkpoint = None;

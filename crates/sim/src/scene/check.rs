@@ -363,12 +363,12 @@ impl Scene {
 fn refuse<T: Declared>(c: &mut Checker<'_>, table: &str, value: &T, error: Error) {
     let keys = value.to_value();
     let refused = error.refused_field().filter(|refused| {
-        let name = refused.name.split('[').next().unwrap_or_default();
+        let name = refused.key.split('[').next().unwrap_or_default();
         keys.as_ref().is_some_and(|keys| keys.get(name).is_some())
     });
     match refused {
         Some(refused) => c.refuse(
-            &format!("{table}.{}", refused.name),
+            &format!("{table}.{}", refused.key),
             &refused.value,
             refused.allowed,
         ),

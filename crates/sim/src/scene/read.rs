@@ -3,7 +3,6 @@
 use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, idle};
 use crate::Error;
 use crate::document::{Content, Document};
-use crate::error::RefusedField;
 use crate::keys::{Format, Key, Text, join, keys_of, to_table, value_at};
 use std::path::Path;
 use std::sync::LazyLock;
@@ -150,7 +149,7 @@ impl SceneFile {
 }
 
 /// Adds the keys of a table, and of those in it, that have the name and the value of a field.
-fn add_keys_of(field: &RefusedField, table: &toml::Value, path: &str, keys: &mut Vec<String>) {
+fn add_keys_of(field: &Problem, table: &toml::Value, path: &str, keys: &mut Vec<String>) {
     let Some(table) = table.as_table() else {
         return;
     };
@@ -160,7 +159,7 @@ fn add_keys_of(field: &RefusedField, table: &toml::Value, path: &str, keys: &mut
             toml::Value::Integer(whole) => Some(*whole as f64),
             value => value.as_float(),
         };
-        if *name == field.name && number.is_some_and(|x| format!("{x:?}") == field.value) {
+        if *name == field.key && number.is_some_and(|x| format!("{x:?}") == field.value) {
             keys.push(key);
         } else {
             add_keys_of(field, value, &key, keys);

@@ -33,7 +33,7 @@ pub use pictures::figure;
 pub use predictions::{
     MOST_VORTICES, PredictedScan, PredictedVortex, Predictions, prediction_table,
 };
-pub use readings::Readings;
+pub use readings::add_reading;
 pub use table::{json, summary, table};
 pub use truth::{TrueFlight, TrueScan, TrueVortex, Truth, VortexValues};
 
@@ -55,30 +55,21 @@ const LEAST_FLIGHTS: usize = 5;
 /// Probabilities of the ends of an interval of 95 %.
 const ENDS: [f64; 2] = [0.025, 0.975];
 
-/// What is predicted of a vortex.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// Lateral coordinate, m.
-    LateralPosition,
-    /// Height above ground, m.
-    Height,
-    /// Circulation averaged over radii of 5 to 15 m, m²/s.
-    Circulation,
+crate::keys::choice! {
+    /// What is predicted of a vortex, by the name of its column.
+    Quantity {
+        /// Lateral coordinate, m.
+        LateralPosition = "y_m",
+        /// Height above ground, m.
+        Height = "z_m",
+        /// Circulation averaged over radii of 5 to 15 m, m²/s.
+        Circulation = "gamma_5_15_m2_s",
+    }
 }
 
 impl Quantity {
     /// All, in the order of columns.
     pub const ALL: [Self; 3] = [Self::LateralPosition, Self::Height, Self::Circulation];
-
-    /// The name that files have for it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::LateralPosition => "y_m",
-            Self::Height => "z_m",
-            Self::Circulation => "gamma_5_15_m2_s",
-        }
-    }
 
     /// The name of its standard deviation.
     #[must_use]
@@ -215,7 +206,7 @@ fn rows(bins: &[Bin], flights: usize, seed: u64) -> Vec<ScoreRow> {
             let mut values = Vec::new();
             for bin in bins {
                 for statistic in bin.statistics(&weights) {
-                    values.push(statistic.found.map_or(f64::NAN, |found| found.value));
+                    values.push(statistic.found.map_or(f64::NAN, |(value, _)| value));
                 }
             }
             values
@@ -247,19 +238,19 @@ fn drawn_weights(flights: usize, seed: u64, draw: u64) -> Vec<f64> {
 
 /// The row of a statistic that the scans of its bin have.
 fn row(bin: &Bin, statistic: &Statistic, interval: impl FnOnce() -> [f64; 2]) -> Option<ScoreRow> {
-    let found = statistic.found?;
+    let (value, count) = statistic.found?;
     let flights = bin.flights.len();
     Some(ScoreRow {
         group: bin.group.name(),
         bin: bin.name.clone(),
         quantity: statistic.quantity,
         statistic: statistic.name,
-        value: found.value,
+        value,
         interval: match flights < LEAST_FLIGHTS {
             true => [f64::NAN; 2],
             false => interval(),
         },
-        count: found.count,
+        count: count as u64,
         flights,
     })
 }

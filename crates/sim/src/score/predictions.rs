@@ -189,13 +189,8 @@ impl Predictions {
         let mut predictions = Self::default();
         let mut nothing: BTreeMap<(usize, usize), usize> = BTreeMap::new();
         for index in 0..table.rows.len() {
-            let row = Row {
-                table: &table,
-                columns: &columns,
-                index,
-            };
-            let key = row.scan(truth)?;
-            let claim = row.claim()?;
+            let key = columns.scan(index, truth)?;
+            let claim = columns.claim(index)?;
             match &truth.flights[key.0] {
                 Some(flight) if options.splits.contains(&flight.split) => {}
                 Some(_) => {
@@ -208,7 +203,7 @@ impl Predictions {
                 }
             }
             let scan = predictions.scans.entry(key).or_default();
-            if let Some(score) = row.score()? {
+            if let Some(score) = columns.score(index)? {
                 scan.score = Some(scan.score.map_or(score, |other| other.max(score)));
             }
             match claim {
@@ -219,15 +214,11 @@ impl Predictions {
             }
             if scan.vortices.len() > MOST_VORTICES {
                 let allowed = format!("at most {MOST_VORTICES} vortices of one scan");
-                return Err(row.refusal("side", &allowed));
+                return Err(columns.refusal(index, "side", &allowed));
             }
             if let (false, Some(first)) = (scan.vortices.is_empty(), nothing.get(&key)) {
-                let row = Row {
-                    index: *first,
-                    ..row
-                };
                 let allowed = "a scan with a vortex in another row has no row with side none";
-                return Err(row.refusal("side", allowed));
+                return Err(columns.refusal(*first, "side", allowed));
             }
         }
         predictions.add_missing(truth, options)?;
@@ -259,8 +250,9 @@ impl Predictions {
     }
 }
 
-/// Indices of the columns.
-struct Columns {
+/// A table with the indices of the columns of predictions.
+struct Columns<'t> {
+    table: &'t TextTable,
     flight: usize,
     scan: usize,
     side: usize,
@@ -269,8 +261,8 @@ struct Columns {
     score: Option<usize>,
 }
 
-impl Columns {
-    fn find(table: &TextTable) -> Result<Self, String> {
+impl<'t> Columns<'t> {
+    fn find(table: &'t TextTable) -> Result<Self, String> {
         let mut values = [0; 3];
         let mut deviations = [None; 3];
         for (index, quantity) in Quantity::ALL.into_iter().enumerate() {
@@ -278,6 +270,7 @@ impl Columns {
             deviations[index] = table.column(quantity.deviation_name());
         }
         Ok(Self {
+            table,
             flight: needed(table, "flight")?,
             scan: needed(table, "scan")?,
             side: needed(table, "side")?,
@@ -296,87 +289,78 @@ fn needed(table: &TextTable, name: &str) -> Result<usize, String> {
     })
 }
 
-/// One row.
-#[derive(Clone, Copy)]
-struct Row<'t> {
-    table: &'t TextTable,
-    columns: &'t Columns,
-    index: usize,
-}
-
-impl Row<'_> {
-    fn cell(&self, column: usize) -> &str {
-        self.table.rows[self.index][column].trim()
+impl Columns<'_> {
+    fn cell(&self, row: usize, column: usize) -> &str {
+        self.table.rows[row][column].trim()
     }
 
     /// What is wrong with the cell of a column.
-    fn refusal(&self, column: &str, allowed: &str) -> String {
+    fn refusal(&self, row: usize, column: &str, allowed: &str) -> String {
         let index = self.table.column(column);
-        let value = index.map_or("", |index| self.cell(index));
-        let row = self.index + 1;
-        format!("row {row}, column {column} = {value:?}: {allowed}")
+        let value = index.map_or("", |index| self.cell(row, index));
+        format!("row {}, column {column} = {value:?}: {allowed}", row + 1)
     }
 
     /// A number; NaN where the cell is empty or `nan`.
-    fn number(&self, column: usize) -> Result<f64, String> {
-        let cell = self.cell(column);
-        let value = self.table.number(self.index, column);
+    fn number(&self, row: usize, column: usize) -> Result<f64, String> {
+        let cell = self.cell(row, column);
+        let value = self.table.number(row, column);
         if value.is_finite() || cell.is_empty() || cell.eq_ignore_ascii_case("nan") {
             return Ok(value);
         }
-        Err(self.refusal(&self.table.header[column], "must be a finite number"))
+        Err(self.refusal(row, &self.table.header[column], "must be a finite number"))
     }
 
     /// A whole number below a limit.
-    fn index(&self, column: usize, count: usize, of: &str) -> Result<usize, String> {
-        let value = self.number(column)?;
+    fn index(&self, row: usize, column: usize, count: usize, of: &str) -> Result<usize, String> {
+        let value = self.number(row, column)?;
         if value.fract() == 0.0 && (0.0..count as f64).contains(&value) {
             return Ok(value as usize);
         }
         let last = count.saturating_sub(1);
         let allowed = format!("there are {of} 0 to {last}");
-        Err(self.refusal(&self.table.header[column], &allowed))
+        Err(self.refusal(row, &self.table.header[column], &allowed))
     }
 
     /// Flight and scan.
-    fn scan(&self, truth: &Truth) -> Result<(usize, usize), String> {
-        let flight = self.index(self.columns.flight, truth.flights.len(), "flights")?;
-        let scan = self.index(self.columns.scan, truth.scans_per_flight, "scans")?;
+    fn scan(&self, row: usize, truth: &Truth) -> Result<(usize, usize), String> {
+        let flight = self.index(row, self.flight, truth.flights.len(), "flights")?;
+        let scan = self.index(row, self.scan, truth.scans_per_flight, "scans")?;
         Ok((flight, scan))
     }
 
-    fn score(&self) -> Result<Option<f64>, String> {
-        let score = self.columns.score.map(|column| self.number(column));
+    fn score(&self, row: usize) -> Result<Option<f64>, String> {
+        let score = self.score.map(|column| self.number(row, column));
         Ok(score.transpose()?.filter(|score| !score.is_nan()))
     }
 
     /// The vortex of the row; none where nothing was found.
-    fn claim(&self) -> Result<Option<PredictedVortex>, String> {
-        let side = match self.cell(self.columns.side) {
+    fn claim(&self, row: usize) -> Result<Option<PredictedVortex>, String> {
+        let side = match self.cell(row, self.side) {
             "none" => return Ok(None),
             "left" => Some(Side::Left),
             "right" => Some(Side::Right),
             "" | "any" => None,
             _ => {
                 let names = ["left", "right", "any", "none"];
-                let allowed = one_of(&names, self.cell(self.columns.side));
-                return Err(self.refusal("side", &allowed));
+                let allowed = one_of(&names, self.cell(row, self.side));
+                return Err(self.refusal(row, "side", &allowed));
             }
         };
         let mut values = [0.0; 3];
         let mut deviations = [f64::NAN; 3];
         for (index, quantity) in Quantity::ALL.into_iter().enumerate() {
-            values[index] = self.number(self.columns.values[index])?;
+            values[index] = self.number(row, self.values[index])?;
             if values[index].is_nan() {
                 let allowed =
                     "a vortex has a place and a circulation; side none says that nothing was found";
-                return Err(self.refusal(quantity.name(), allowed));
+                return Err(self.refusal(row, quantity.name(), allowed));
             }
-            if let Some(column) = self.columns.deviations[index] {
-                deviations[index] = self.number(column)?;
+            if let Some(column) = self.deviations[index] {
+                deviations[index] = self.number(row, column)?;
                 if deviations[index] <= 0.0 {
                     let allowed = "must be above 0, or empty where it is not known";
-                    return Err(self.refusal(quantity.deviation_name(), allowed));
+                    return Err(self.refusal(row, quantity.deviation_name(), allowed));
                 }
             }
         }

@@ -13,56 +13,29 @@ use std::path::Path;
 const FILE: &str = "scored.csv";
 const HEADER: &str = "predictions_sha256,splits\n";
 
-/// What a data set was scored with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Readings {
-    /// Other predictions that test splits were scored with before.
-    pub before: usize,
-    /// Whether these are in the list; those of `train` and `validation` alone need not be.
-    pub is_listed: bool,
-}
-
-impl Readings {
-    /// Adds the text of predictions to the list of a data set, where it may be written and has not got them.
-    #[must_use]
-    pub fn add(folder: &Path, text: &str, splits: &[Split]) -> Self {
-        let path = folder.join(FILE);
-        let listed = read_to_string(&path).unwrap_or_default();
-        let mut hash = String::new();
-        for byte in Sha256::digest(text.as_bytes()) {
-            hash += &format!("{byte:02x}");
-        }
-        let names: Vec<&str> = splits.iter().map(|split| split.name()).collect();
-        let line = format!("{hash},{}", names.join(" "));
-        let mut others: Vec<&str> = listed.lines().skip(1).filter_map(hash_of).collect();
-        others.retain(|other| *other != hash);
-        others.sort_unstable();
-        others.dedup();
-        let before = others.len();
-        if !splits.iter().any(|split| split.is_test()) {
-            return Self {
-                before,
-                is_listed: false,
-            };
-        }
+/// Adds the text of predictions to the list of a data set, where it may be written and has not got them; those of `train` and
+/// `validation` alone need not be in it. Returns the number of other predictions that test splits were scored with before.
+#[must_use]
+pub fn add_reading(folder: &Path, text: &str, splits: &[Split]) -> usize {
+    let path = folder.join(FILE);
+    let listed = read_to_string(&path).unwrap_or_default();
+    let mut hash = String::new();
+    for byte in Sha256::digest(text.as_bytes()) {
+        hash += &format!("{byte:02x}");
+    }
+    let names: Vec<&str> = splits.iter().map(|split| split.name()).collect();
+    let line = format!("{hash},{}", names.join(" "));
+    let mut others: Vec<&str> = listed.lines().skip(1).filter_map(hash_of).collect();
+    others.retain(|other| *other != hash);
+    others.sort_unstable();
+    others.dedup();
+    let is_listed = listed.lines().any(|other| other == line);
+    if splits.iter().any(|split| split.is_test()) && !is_listed {
         let header = if listed.is_empty() { HEADER } else { "" };
-        let is_listed = listed.lines().any(|other| other == line)
-            || append(&path, &format!("{header}{line}\n")).is_ok();
-        Self { before, is_listed }
+        // A folder that cannot be written to has no list.
+        let _ = append(&path, &format!("{header}{line}\n"));
     }
-
-    /// For people.
-    #[must_use]
-    pub fn text(self) -> String {
-        match self.before {
-            0 => String::new(),
-            before => {
-                format!(
-                    "test splits of this data set were scored with other predictions before: {before}\n"
-                )
-            }
-        }
-    }
+    others.len()
 }
 
 fn hash_of(line: &str) -> Option<&str> {
@@ -81,19 +54,18 @@ mod tests {
     #[test]
     fn predictions_are_listed_once_and_others_counted() {
         let temp = tempfile::tempdir().unwrap();
-        let add = |text: &str, splits: &[Split]| Readings::add(temp.path(), text, splits);
-        let first = add("a", &[Split::TestHome, Split::TestAway]);
-        assert_eq!((first.before, first.is_listed), (0, true));
-        assert_eq!(add("a", &[Split::TestHome, Split::TestAway]), first);
-        assert_eq!(add("b", &[Split::TestHome]).before, 1);
-        let train = add("c", &[Split::Train]);
-        assert_eq!((train.before, train.is_listed), (2, false));
+        let add = |text: &str, splits: &[Split]| add_reading(temp.path(), text, splits);
+        assert_eq!(add("a", &[Split::TestHome, Split::TestAway]), 0);
+        assert_eq!(add("a", &[Split::TestHome, Split::TestAway]), 0);
+        assert_eq!(add("b", &[Split::TestHome]), 1);
+        assert_eq!(add("c", &[Split::Train]), 2);
         let listed = read_to_string(temp.path().join(FILE)).unwrap();
         // SHA-256 of "a".
         let hash = "ca978112ca1bbdcafac231b39a23dc4da786eff8147c4e72b9807785afee48bb";
         assert!(listed.starts_with(&format!("{HEADER}{hash},test_home test_away\n")));
         assert_eq!(listed.lines().count(), 3);
-        let nowhere = Readings::add(&temp.path().join("nowhere"), "a", &[Split::TestHome]);
-        assert!(!nowhere.is_listed);
+        let nowhere = temp.path().join("nowhere");
+        assert_eq!(add_reading(&nowhere, "a", &[Split::TestHome]), 0);
+        assert!(!nowhere.exists());
     }
 }

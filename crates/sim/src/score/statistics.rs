@@ -30,27 +30,13 @@ const LEAST_FALSE_ALARMS: f64 = 3.0;
 pub(super) struct Statistic {
     pub(super) quantity: &'static str,
     pub(super) name: &'static str,
-    /// Absent where nothing in the bin has it.
-    pub(super) found: Option<Counted>,
+    /// Its value and the number of vortices or scans that it is of; absent where nothing in the bin has it.
+    pub(super) found: Option<(f64, f64)>,
 }
 
-/// A value and the number of vortices or scans that it is of.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Counted {
-    pub(super) value: f64,
-    pub(super) count: u64,
-}
-
-/// A ratio of sums; absent where the sum below is 0.
-fn ratio(above: f64, below: f64, count: f64) -> Option<Counted> {
-    (below > 0.0).then(|| counted(above / below, count))
-}
-
-fn counted(value: f64, count: f64) -> Counted {
-    Counted {
-        value,
-        count: count as u64,
-    }
+/// A ratio of sums and its count; absent where the sum below is 0.
+fn ratio(above: f64, below: f64, count: f64) -> Option<(f64, f64)> {
+    (below > 0.0).then(|| (above / below, count))
 }
 
 impl Bin {
@@ -89,7 +75,7 @@ impl Bin {
         let mut means = vec![
             ("bias", own.error / sums.hits),
             ("rms", (own.square / sums.hits).sqrt()),
-            ("skill", skill.map_or(f64::NAN, |ratio| 1.0 - ratio.value)),
+            ("skill", skill.map_or(f64::NAN, |(ratio, _)| 1.0 - ratio)),
             ("crps", own.crps / sums.hits),
         ];
         if quantity == Quantity::Circulation {
@@ -101,7 +87,7 @@ impl Bin {
         list.push(Statistic {
             quantity: name,
             name: "reduced_rms",
-            found: reduced.map(|square| counted(square.value.sqrt(), own.stated)),
+            found: reduced.map(|(square, count)| (square.sqrt(), count)),
         });
         for (covered, (.., coverage)) in own.covered.into_iter().zip(NOMINAL) {
             list.push(Statistic {
@@ -129,7 +115,7 @@ impl Bin {
             list.push(Statistic {
                 quantity,
                 name,
-                found: (sums.hits > 0.0).then(|| counted(value, sums.hits)),
+                found: (sums.hits > 0.0).then_some((value, sums.hits)),
             });
         }
     }
@@ -137,7 +123,7 @@ impl Bin {
     fn add_vortices(&self, list: &mut Vec<Statistic>, sums: &FlightSums) {
         let scored = sums.hits + sums.missed;
         // It stands for the bin even where nothing is scored.
-        let recall = Some(counted(sums.hits / scored, scored));
+        let recall = Some((sums.hits / scored, scored));
         let mut of_vortices = vec![("recall", recall)];
         if self.group != Group::Height {
             let predicted = sums.hits + sums.false_vortices;
@@ -158,7 +144,7 @@ impl Bin {
         let judged = sums.wakes + sums.empty;
         let all = sums.detected + sums.false_alarms + sums.wakes;
         let has_scores = sums.wakes > 0.0 && sums.empty > 0.0 && sums.with_score > 0.0;
-        let auc = has_scores.then(|| counted(area(&self.wakes, &self.empty, weights), judged));
+        let auc = has_scores.then(|| (area(&self.wakes, &self.empty, weights), judged));
         let mut of_scans = vec![
             ("detected", ratio(sums.detected, sums.wakes, sums.wakes)),
             (
@@ -172,7 +158,7 @@ impl Bin {
             let value = has_scores
                 .then(|| self.detected_at(rate, weights))
                 .flatten();
-            of_scans.push((name, value.map(|value| counted(value, judged))));
+            of_scans.push((name, value.map(|value| (value, judged))));
         }
         for (name, found) in of_scans {
             list.push(Statistic {

@@ -4,11 +4,11 @@
 //! stored cases, to the last bit.
 
 use super::expression;
-use super::key_path::{Holds, SceneKey, VaryingKey, resolve};
+use super::key_path::{SceneKey, VaryingKey, resolve};
 use crate::Error;
 use crate::io::csv_input::TextTable;
 use crate::io::{Provenance, csv::float_text};
-use crate::keys::{Problem, SceneError, to_table, value_at};
+use crate::keys::{Kind, Problem, SceneError, to_table, value_at};
 use crate::scene::{Scene, SceneFile, hash_of};
 use crate::streams::stream;
 use rand_xoshiro::rand_core::Rng;
@@ -40,28 +40,6 @@ pub struct Request {
     /// Seed in place of the scene's.
     #[cfg_attr(feature = "cli", arg(skip))]
     pub seed: Option<u64>,
-}
-
-/// A key that varies.
-#[derive(Debug, Clone, PartialEq)]
-struct VaryingColumn {
-    varying: VaryingKey,
-    key: SceneKey,
-}
-
-impl VaryingColumn {
-    /// The key that a word names; `value` is what it is to be.
-    fn named(word: &str, value: &str, tied: bool) -> Result<Self, Problem> {
-        let key = resolve(word.trim(), value.trim())?;
-        Ok(Self {
-            varying: VaryingKey {
-                name: word.trim().into(),
-                holds: Holds::from_kind(&key.kind),
-                tied,
-            },
-            key,
-        })
-    }
 }
 
 /// One case.
@@ -103,14 +81,17 @@ impl Sweep {
         let cases = grid
             .cases()
             .map_err(|error| scene_error(text, path, error))?;
-        let mut keys: Vec<VaryingKey> = grid
-            .columns()
-            .map(|column| column.varying.clone())
-            .collect();
+        let mut keys = Vec::new();
+        for key in &grid.columns {
+            keys.push(VaryingKey::new(key, false));
+        }
+        for (key, _) in &grid.lets {
+            keys.push(VaryingKey::new(key, true));
+        }
         if request.independent
-            && let Ok(seed) = VaryingColumn::named("seed", "", true)
+            && let Ok(seed) = resolve("seed", "")
         {
-            keys.push(seed.varying);
+            keys.push(VaryingKey::new(&seed, true));
         }
         let origin = grid.origin(&keys, &cases);
         Ok(Self {
@@ -177,25 +158,23 @@ fn refused(word: &str, problem: Problem) -> Error {
 }
 
 /// Keys that vary together, and their values, a row for each combination.
-type Axis = (Vec<VaryingColumn>, Vec<Vec<Value>>);
+type Axis = (Vec<SceneKey>, Vec<Vec<Value>>);
+
 /// Refuses keys that vary twice.
 fn check_columns(
-    columns: &[VaryingColumn],
-    lets: &[(VaryingColumn, &str)],
+    columns: &[SceneKey],
+    lets: &[(SceneKey, &str)],
     is_independent: bool,
 ) -> Result<(), Error> {
     let mut paths = Vec::new();
     let mut has_seed = false;
-    for column in columns.iter().chain(lets.iter().map(|(own, _)| own)) {
-        if paths.contains(&&column.key.path) {
+    for key in columns.iter().chain(lets.iter().map(|(own, _)| own)) {
+        if paths.contains(&&key.path) {
             let why = "each key varies once, by --vary, --cases or --let";
-            return Err(refused(
-                "sweep",
-                Problem::new(&column.varying.name, "", why),
-            ));
+            return Err(refused("sweep", Problem::new(&key.name, "", why)));
         }
-        paths.push(&column.key.path);
-        has_seed |= column.key.path == "seed";
+        paths.push(&key.path);
+        has_seed |= key.path == "seed";
     }
     if is_independent && has_seed {
         let why = "with --independent each case has a seed of its own: leave one of the two out";
@@ -210,10 +189,10 @@ struct Grid<'a> {
     base: Table,
     request: &'a Request,
     /// Keys with values of their own, and those that each combination has.
-    columns: Vec<VaryingColumn>,
+    columns: Vec<SceneKey>,
     rows: Vec<Vec<Value>>,
     /// Keys with the expressions that determine them.
-    lets: Vec<(VaryingColumn, &'a str)>,
+    lets: Vec<(SceneKey, &'a str)>,
 }
 
 impl<'a> Grid<'a> {
@@ -267,12 +246,6 @@ impl<'a> Grid<'a> {
         })
     }
 
-    fn columns(&self) -> impl Iterator<Item = &VaryingColumn> {
-        self.columns
-            .iter()
-            .chain(self.lets.iter().map(|(column, _)| column))
-    }
-
     fn cases(&self) -> Result<Vec<Case>, Error> {
         let mut cases = Vec::new();
         let mut refusals = Vec::new();
@@ -290,13 +263,12 @@ impl<'a> Grid<'a> {
         }
         let others = refusals.len().saturating_sub(1);
         if let Some((combination, values, error)) = refusals.into_iter().next() {
-            let names = self.columns().map(|column| column.varying.name.as_str());
-            return Err(failed(
-                combination,
-                described(names, &values),
-                others,
-                error,
-            ));
+            let keys = self
+                .columns
+                .iter()
+                .chain(self.lets.iter().map(|(key, _)| key));
+            let keys = described(keys.map(|key| key.name.as_str()), &values);
+            return Err(failed(combination, keys, others, error));
         }
         if cases.is_empty() {
             let why = format!("none of the {} cases is left", self.rows.len());
@@ -322,20 +294,16 @@ impl<'a> Grid<'a> {
                 Value::Integer(i64::try_from(seed).unwrap_or(i64::MAX)),
             );
         }
-        for (column, value) in self.columns.iter().zip(row) {
+        for (key, value) in self.columns.iter().zip(row) {
             values.push(cell_text(value));
-            set(&mut table, &column.key.path, value.clone());
+            set(&mut table, &key.path, value.clone());
         }
-        for (column, expression) in &self.lets {
+        for (key, expression) in &self.lets {
             let whole = self.whole(&table)?;
-            let value = computed(column, expression, &whole).map_err(|why| {
-                refused(
-                    "--let",
-                    Problem::new(&column.varying.name, *expression, why),
-                )
-            })?;
+            let value = computed(key, expression, &whole)
+                .map_err(|why| refused("--let", Problem::new(&key.name, *expression, why)))?;
             values.push(cell_text(&value));
-            set(&mut table, &column.key.path, value);
+            set(&mut table, &key.path, value);
         }
         if !self.request.conditions.is_empty() {
             let whole = self.whole(&table)?;
@@ -391,12 +359,9 @@ impl<'a> Grid<'a> {
 }
 
 /// The value of a key by an expression of other keys.
-fn computed(column: &VaryingColumn, expression: &str, whole: &Value) -> Result<Value, String> {
+fn computed(key: &SceneKey, expression: &str, whole: &Value) -> Result<Value, String> {
     let number = expression::value(expression, Some(&|name| number_of_key(whole, name)))?;
-    column
-        .key
-        .of_number(number)
-        .map_err(|problem| problem.allowed)
+    key.of_number(number).map_err(|problem| problem.allowed)
 }
 
 fn seed_of(table: &Table) -> Option<u64> {
@@ -412,9 +377,7 @@ fn axis(word: &str) -> Result<Axis, Problem> {
         .ok_or_else(|| Problem::new("--vary", word, example))?;
     let name = name.trim();
     let text = text.trim();
-    let column = VaryingColumn::named(name, text, false)?;
-    let key = &column.key;
-    let is_numeric = column.varying.holds != Holds::Texts;
+    let key = resolve(name, text)?;
     if text.is_empty() {
         return Err(Problem::new(
             name,
@@ -424,7 +387,7 @@ fn axis(word: &str) -> Result<Axis, Problem> {
     }
     let range = text
         .split_once(':')
-        .filter(|(kind, _)| is_numeric && matches!(*kind, "lin" | "log"));
+        .filter(|(kind, _)| is_numeric(&key) && matches!(*kind, "lin" | "log"));
     let values = match range {
         Some((kind, rest)) => {
             let numbers =
@@ -440,7 +403,12 @@ fn axis(word: &str) -> Result<Axis, Problem> {
             .collect::<Result<_, _>>()?,
     };
     let rows = values.into_iter().map(|value| vec![value]).collect();
-    Ok((vec![column], rows))
+    Ok((vec![key], rows))
+}
+
+/// Whether a key holds numbers.
+fn is_numeric(key: &SceneKey) -> bool {
+    matches!(key.kind, Kind::Number | Kind::Whole { .. })
 }
 
 /// `a:b:n`: from a to b, both as written.
@@ -486,22 +454,19 @@ fn wrong_range() -> String {
 }
 
 /// `KEY = EXPRESSION`.
-fn binding(word: &str) -> Result<(VaryingColumn, &str), Problem> {
+fn binding(word: &str) -> Result<(SceneKey, &str), Problem> {
     let example = "KEY = EXPRESSION, e.g. pulse.energy_j = 0.06/laser.pulse_repetition_hz";
     let (name, text) = word
         .split_once('=')
         .ok_or_else(|| Problem::new("--let", word, example))?;
-    let column = VaryingColumn::named(name, text, true)?;
     let text = text.trim();
-    if column.varying.holds == Holds::Texts {
-        return Err(Problem::new(
-            &column.varying.name,
-            text,
-            "an expression is a number, and this key is none",
-        ));
+    let key = resolve(name.trim(), text)?;
+    if !is_numeric(&key) {
+        let allowed = "an expression is a number, and this key is none";
+        return Err(Problem::new(&key.name, text, allowed));
     }
-    expression::value(text, None).map_err(|why| Problem::new(&column.varying.name, text, why))?;
-    Ok((column, text))
+    expression::value(text, None).map_err(|why| Problem::new(&key.name, text, why))?;
+    Ok((key, text))
 }
 
 /// The keys and rows of a list file.
@@ -521,13 +486,13 @@ fn list_of_table(table: &TextTable) -> Result<Axis, Problem> {
     }
     let mut columns = Vec::with_capacity(table.header.len());
     for name in &table.header {
-        columns.push(VaryingColumn::named(name, "", false)?);
+        columns.push(resolve(name.trim(), "")?);
     }
     let mut rows = Vec::with_capacity(table.rows.len());
     for cells in &table.rows {
         let mut row = Vec::with_capacity(cells.len());
-        for (column, cell) in columns.iter().zip(cells) {
-            row.push(column.key.read(cell)?);
+        for (key, cell) in columns.iter().zip(cells) {
+            row.push(key.read(cell)?);
         }
         rows.push(row);
     }

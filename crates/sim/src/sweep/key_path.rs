@@ -15,6 +15,8 @@ const WITHOUT_RESULT: [&str; 3] = ["format", "outputs", "site"];
 /// A key of the scene with what it takes.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SceneKey {
+    /// As it was written, such as `pulse.duration_s`.
+    pub(crate) name: String,
     /// Its path, such as `pulse.shape.duration_s`.
     pub(crate) path: String,
     pub(crate) kind: Kind,
@@ -27,10 +29,7 @@ fn leaves(keys: &[Key], path: &str, out: &mut Vec<SceneKey>) {
             Kind::Table(inner) => leaves(inner, &here, out),
             Kind::Tagged { tag, kinds } => {
                 let names = kinds.iter().map(|(name, _)| *name).collect();
-                out.push(SceneKey {
-                    path: join(&here, tag),
-                    kind: Kind::Choice(names),
-                });
+                out.push(SceneKey::at(join(&here, tag), Kind::Choice(names)));
                 for (_, inner) in kinds {
                     leaves(inner, &here, out);
                 }
@@ -38,10 +37,7 @@ fn leaves(keys: &[Key], path: &str, out: &mut Vec<SceneKey>) {
             kind => match out.iter_mut().find(|known| known.path == here) {
                 // A key of this name in several kinds of the table: reading the scene says whether it has the one in force.
                 Some(known) => join_kinds(&mut known.kind, kind),
-                None => out.push(SceneKey {
-                    path: here,
-                    kind: kind.clone(),
-                }),
+                None => out.push(SceneKey::at(here, kind.clone())),
             },
         }
     }
@@ -87,12 +83,17 @@ fn shortens(short: &str, path: &str) -> bool {
 pub(crate) fn resolve(written: &str, value: &str) -> Result<SceneKey, Problem> {
     let refused = |allowed| Problem::new(written, value, allowed);
     let Some((index, key)) = added_flow(written) else {
-        return varying_key(written).cloned().map_err(refused);
+        let key = varying_key(written).map_err(refused)?;
+        return Ok(SceneKey {
+            name: written.into(),
+            ..key.clone()
+        });
     };
     // An added flow has the keys of the first one.
     let flow = varying_key(&format!("flow.{key}")).map_err(refused)?;
     let own = flow.path.split_once('.').map_or("", |(_, own)| own);
     Ok(SceneKey {
+        name: written.into(),
         path: format!("added_flows.{index}.{own}"),
         kind: flow.kind.clone(),
     })
@@ -186,6 +187,15 @@ fn last_part(path: &str) -> &str {
 }
 
 impl SceneKey {
+    /// A key by its whole path.
+    fn at(path: String, kind: Kind) -> Self {
+        Self {
+            name: path.clone(),
+            path,
+            kind,
+        }
+    }
+
     /// A text as a value of the key.
     pub(crate) fn read(&self, text: &str) -> Result<Value, Problem> {
         let text = text.trim();
@@ -242,16 +252,6 @@ pub(super) enum Holds {
     Texts,
 }
 
-impl Holds {
-    pub(super) fn from_kind(kind: &Kind) -> Self {
-        match kind {
-            Kind::Number => Self::Numbers,
-            Kind::Whole { .. } => Self::WholeNumbers,
-            _ => Self::Texts,
-        }
-    }
-}
-
 /// A key that varies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct VaryingKey {
@@ -260,6 +260,20 @@ pub(super) struct VaryingKey {
     pub(super) holds: Holds,
     /// Whether others determine it.
     pub(super) tied: bool,
+}
+
+impl VaryingKey {
+    pub(super) fn new(key: &SceneKey, tied: bool) -> Self {
+        Self {
+            name: key.name.clone(),
+            holds: match key.kind {
+                Kind::Number => Holds::Numbers,
+                Kind::Whole { .. } => Holds::WholeNumbers,
+                _ => Holds::Texts,
+            },
+            tied,
+        }
+    }
 }
 
 #[cfg(test)]

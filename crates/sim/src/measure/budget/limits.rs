@@ -1,5 +1,6 @@
 //! What bounds an instrument beside its signal-to-noise ratio: power, ranges, velocities, phase noise, local oscillator, resolution.
 
+use super::Budget;
 use super::digits::si;
 use crate::measure::ray_information::range_filter;
 use crate::plan::Plan;
@@ -14,41 +15,26 @@ use wakescope_signal::receiver::phase_noise::{mean_frequency_sd_m_s, peak_varian
 /// Signal-to-noise ratio below which the telescope's reflex does no harm, -20 dB.
 const HARMLESS_SNR: f64 = 0.01;
 
-/// Numbers and words of what bounds an instrument.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Limits {
-    /// Names with units, and values.
-    pub values: Vec<(&'static str, f64)>,
-    /// The same for people.
-    pub lines: Vec<String>,
-}
-
-impl Limits {
-    /// The limits of a planned scene.
+impl Budget {
+    /// Adds the limits of a planned scene.
     ///
     /// # Errors
     /// What estimators and signals refuse; a checked scene gives none.
-    pub fn new(plan: &Plan) -> Result<Self, Error> {
+    pub(super) fn add_limits(&mut self, plan: &Plan) -> Result<(), Error> {
         let scene = plan.scene();
         let instrument = &plan.instrument;
         let receiver = &instrument.receiver;
         let pulse = &instrument.pulse;
         let d = &scene.detector;
-        let mut found = Self {
-            values: Vec::new(),
-            lines: Vec::new(),
-        };
         let mean_w = scene.pulse.energy_j * scene.laser.pulse_repetition_hz;
         let peak_w = instrument.peak_power_w();
         let power = format!("mean power {}, peak {}", si(mean_w, "W"), si(peak_w, "W"));
-        found
-            .values
+        self.limits
             .extend([("mean_power_w", mean_w), ("peak_power_w", peak_w)]);
-        found.lines.push(power);
+        self.limit_lines.push(power);
         let apart_m = ambiguous_range_m(scene.laser.pulse_repetition_hz);
         let blind_m = 0.5 * SPEED_OF_LIGHT_M_S * receiver.blind_time_s(pulse, HARMLESS_SNR);
-        found
-            .values
+        self.limits
             .extend([("reflex_range_m", blind_m), ("ambiguous_range_m", apart_m)]);
         let mut blind = Vec::new();
         if receiver.front_end.reflection > 0.0 {
@@ -65,10 +51,11 @@ impl Limits {
             ));
         }
         blind.push(format!("ambiguous from {}", si(apart_m, "m")));
-        found.lines.push(format!("range: {}", blind.join("; ")));
-        found.velocities(plan);
+        self.limit_lines
+            .push(format!("range: {}", blind.join("; ")));
+        self.velocities(plan);
         if scene.laser.linewidth_hz > 0.0 {
-            found.phase_noise(plan)?;
+            self.phase_noise(plan)?;
         }
         let n = receiver.noise_densities();
         let mut oscillator = vec![format!(
@@ -79,7 +66,7 @@ impl Limits {
             // Shot noise grows with the power, this noise does not.
             let equal_w =
                 n.amplifier_a2_hz / (2.0 * ELEMENTARY_CHARGE_C * receiver.responsivity_a_w());
-            found.values.push(("amplifier_equals_shot_w", equal_w));
+            self.limits.push(("amplifier_equals_shot_w", equal_w));
             oscillator.push(format!(
                 "amplifier noise equals shot noise at {}",
                 si(equal_w, "W")
@@ -87,12 +74,12 @@ impl Limits {
         }
         if n.intensity_a2_hz > 0.0 {
             let equal_w = d.local_oscillator_w * n.shot_a2_hz / n.intensity_a2_hz;
-            found.values.push(("intensity_equals_shot_w", equal_w));
+            self.limits.push(("intensity_equals_shot_w", equal_w));
             oscillator.push(format!("intensity noise equals it at {}", si(equal_w, "W")));
         }
         let best_w = receiver.best_local_oscillator_w();
         if best_w > 0.0 && best_w.is_finite() {
-            found.values.push(("best_local_oscillator_w", best_w));
+            self.limits.push(("best_local_oscillator_w", best_w));
             oscillator.push(format!("best at {}", si(best_w, "W")));
         }
         let (first, rest) = oscillator.split_at(1);
@@ -101,9 +88,8 @@ impl Limits {
         } else {
             rest.join("; ")
         };
-        found.lines.push(format!("{}: {rest}", first.concat()));
-        found.resolution(plan)?;
-        Ok(found)
+        self.limit_lines.push(format!("{}: {rest}", first.concat()));
+        self.resolution(plan)
     }
 
     fn velocities(&mut self, plan: &Plan) {
@@ -112,12 +98,12 @@ impl Limits {
         let band_m_s = 0.5 * half_m * d.bandwidth_hz;
         let (low_m_s, high_m_s) = sampled_velocities_m_s(plan.scene());
         let flow_m_s = plan.fastest_m_s;
-        self.values.extend([
+        self.limits.extend([
             ("band_m_s", band_m_s),
             ("sampled_from_m_s", low_m_s),
             ("sampled_to_m_s", high_m_s),
         ]);
-        self.lines.push(format!(
+        self.limit_lines.push(format!(
             "velocity: band +-{band_m_s:.1} m/s; sampled {low_m_s:+.1} to {high_m_s:+.1} m/s; flow reaches {flow_m_s:.0} m/s"
         ));
     }
@@ -135,11 +121,11 @@ impl Limits {
         let at = |s: f64| weights[(((s + 0.5) * PLACES as f64) as usize).min(PLACES - 1)];
         let peak_m_s = mean_m_s * peak_variance_factor(at).sqrt();
         let spectrum_m_s = 0.5 * wavelength_m * plan.instrument.pulse.spectral_width_hz();
-        self.values.extend([
+        self.limits.extend([
             ("phase_noise_m_s", mean_m_s),
             ("phase_noise_of_peak_m_s", peak_m_s),
         ]);
-        self.lines.push(format!(
+        self.limit_lines.push(format!(
             "linewidth {}: {mean_m_s:.3} m/s a window, its peak {peak_m_s:.3} m/s (spectrum of one pulse {spectrum_m_s:.2} m/s)",
             si(linewidth_hz, "Hz")
         ));
@@ -156,11 +142,11 @@ impl Limits {
             Weighting::Rectangular => "rectangular",
             Weighting::Hann => "Hann",
         };
-        self.values.extend([
+        self.limits.extend([
             ("pulse_resolution_m", pulse_m),
             ("gate_resolution_m", gate_m),
         ]);
-        self.lines.push(format!(
+        self.limit_lines.push(format!(
             "resolution: pulse {pulse_m:.1} m, gate (pulse and {weighting} window of {}) {gate_m:.1} m, full width at half maximum",
             scene.estimator.window_samples
         ));

@@ -6,8 +6,6 @@
 mod digits;
 mod limits;
 
-pub use limits::Limits;
-
 use crate::Error;
 use crate::io::Table;
 use crate::measure::profile::{EfficiencyMemo, LineOptics, efficiency_by_theory, free_space};
@@ -42,8 +40,10 @@ pub struct Budget {
     pub range_m: Vec<f64>,
     /// Factors, each sum below what it sums.
     pub rows: Vec<Row>,
-    /// What bounds the instrument.
-    pub limits: Limits,
+    /// What bounds the instrument: names with units, and values.
+    pub limits: Vec<(&'static str, f64)>,
+    /// The same for people.
+    pub limit_lines: Vec<String>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -71,15 +71,10 @@ impl Budget {
             known: &EfficiencyMemo::default(),
             observer,
         };
-        let mut rows = Rows::new(plan, range_m, |sorted_m| optics.efficiency_at(sorted_m))?;
-        rows.beside_the_ratio()?;
-        let limits = Limits::new(plan)?;
-        Ok(Self {
-            range_m: range_m.to_vec(),
-            rows: rows.rows,
-            limits,
-            warnings: plan.warnings.clone(),
-        })
+        let mut budget = Self::of_ratio(plan, range_m, |sorted_m| optics.efficiency_at(sorted_m))?;
+        budget.beside_the_ratio(plan)?;
+        budget.add_limits(plan)?;
+        Ok(budget)
     }
 
     /// The signal-to-noise ratio in the detector band at each range, dB.
@@ -117,7 +112,7 @@ impl Budget {
             out += &format!("  {:<28}{:<36}{cells}\n", row.name, row.value);
         }
         out += "limits\n";
-        for line in &self.limits.lines {
+        for line in &self.limit_lines {
             out += &format!("  {line}\n");
         }
         for warning in &self.warnings {
@@ -132,11 +127,11 @@ impl Budget {
 /// # Errors
 /// What the optics refuse.
 pub fn snr_without_screens_db(plan: &Plan, range_m: &[f64]) -> Result<Vec<f64>, Error> {
-    let rows = Rows::new(plan, range_m, |sorted_m| {
+    let budget = Budget::of_ratio(plan, range_m, |sorted_m| {
         efficiency_by_theory(&plan.instrument, sorted_m)
     })?;
     // The last row of all.
-    Ok(rows
+    Ok(budget
         .rows
         .into_iter()
         .next_back()
@@ -154,43 +149,38 @@ fn decibels(ratio: f64) -> f64 {
     10.0 * ratio.log10()
 }
 
-/// Rows under construction, at the ranges of a budget, m.
-struct Rows<'a> {
-    plan: &'a Plan,
-    range_m: &'a [f64],
-    rows: Vec<Row>,
-}
-
-impl<'a> Rows<'a> {
+impl Budget {
     /// All that the signal-to-noise ratio is made of; `efficiency` is asked for increasing ranges, if the scene needs any.
-    fn new(
-        plan: &'a Plan,
-        range_m: &'a [f64],
+    fn of_ratio(
+        plan: &Plan,
+        range_m: &[f64],
         efficiency: impl FnOnce(&[f64]) -> Result<EfficiencyProfile, Error>,
     ) -> Result<Self, Error> {
-        let mut rows = Self {
-            plan,
-            range_m,
+        let mut budget = Self {
+            range_m: range_m.to_vec(),
             rows: Vec::new(),
+            limits: Vec::new(),
+            limit_lines: Vec::new(),
+            warnings: plan.warnings.clone(),
         };
         match plan.scene().detector.snr {
             SnrReference::Fixed { snr_db } => {
-                rows.same("stated by the scene", "", "detector.snr".into(), snr_db)
+                budget.same("stated by the scene", "", "detector.snr".into(), snr_db)
             }
             _ => {
-                rows.transmitter_and_path(&efficiency(&increasing(range_m))?)?;
-                rows.sum("= shot-noise limit", "(14)", "(14)".into());
-                rows.receiver();
+                budget.transmitter_and_path(plan, &efficiency(&increasing(range_m))?)?;
+                budget.sum("= shot-noise limit", "(14)", "(14)".into());
+                budget.receiver(plan);
             }
         }
-        rows.sum(TOTAL, "", "one pulse".into());
-        Ok(rows)
+        budget.sum(TOTAL, "", "one pulse".into());
+        Ok(budget)
     }
 
     /// The ratio in the width of the pulse, and the echo of the pulse before.
-    fn beside_the_ratio(&mut self) -> Result<(), Error> {
-        let scene = self.plan.scene();
-        let instrument = &self.plan.instrument;
+    fn beside_the_ratio(&mut self, plan: &Plan) -> Result<(), Error> {
+        let scene = plan.scene();
+        let instrument = &plan.instrument;
         let width_hz = instrument.pulse.spectral_full_width_half_maximum_hz();
         let gain_db = decibels(scene.detector.bandwidth_hz / width_hz);
         let fwhm_s = instrument.gaussian_fwhm_s();
@@ -266,9 +256,13 @@ impl<'a> Rows<'a> {
     }
 
     /// From the photons of the pulse to the electrons that it gives.
-    fn transmitter_and_path(&mut self, efficiency: &EfficiencyProfile) -> Result<(), Error> {
-        let scene = self.plan.scene();
-        let instrument = &self.plan.instrument;
+    fn transmitter_and_path(
+        &mut self,
+        plan: &Plan,
+        efficiency: &EfficiencyProfile,
+    ) -> Result<(), Error> {
+        let scene = plan.scene();
+        let instrument = &plan.instrument;
         let telescope = &instrument.telescope;
         let receiver = &instrument.receiver;
         let t = &scene.telescope;
@@ -345,7 +339,7 @@ impl<'a> Rows<'a> {
             format!("T = {passed:.4}"),
             2.0 * decibels(passed),
         );
-        let empty = free_space(instrument, &increasing(self.range_m))?;
+        let empty = free_space(instrument, &increasing(&self.range_m))?;
         let antenna = self.at_each(&|r| Ok(empty.interpolated(r)? / passed.powi(2)))?;
         self.push("antenna efficiency", "eta_a", "free space".into(), antenna);
         if let Some(air) = scene.refractive_turbulence() {
@@ -384,9 +378,9 @@ impl<'a> Rows<'a> {
     }
 
     /// What the receiver loses against the shot-noise limit.
-    fn receiver(&mut self) {
-        let scene = self.plan.scene();
-        let instrument = &self.plan.instrument;
+    fn receiver(&mut self, plan: &Plan) {
+        let scene = plan.scene();
+        let instrument = &plan.instrument;
         let receiver = &instrument.receiver;
         let front = scene.detector.front_end.unwrap_or_default();
         let lost = receiver.penalties();
