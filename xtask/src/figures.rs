@@ -41,22 +41,9 @@ pub(crate) struct Figure {
     pub(crate) title: &'static str,
     /// Processor time with the profile quick, about, on a slow core \[s\].
     pub(crate) quick_core_s: f64,
-    /// The row of panels that its thumbnail shows.
-    pub(crate) row: Row,
+    /// The row of panels that its thumbnail shows, from the top, from 0, and the number of rows, which have equal heights.
+    pub(crate) row: (u32, u32),
     pub(crate) make: Make,
-}
-
-/// One of several rows of panels of equal height.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Row {
-    /// From the top, from 0.
-    pub(crate) index: u32,
-    pub(crate) count: u32,
-}
-
-impl Row {
-    /// The whole picture.
-    pub(crate) const ALL: Self = Self { index: 0, count: 1 };
 }
 
 /// Which figures are drawn one after the other.
@@ -74,7 +61,7 @@ impl Figure {
     /// The figure with a row of panels as its thumbnail, the index from 0.
     const fn with_row(self, index: u32, count: u32) -> Self {
         Self {
-            row: Row { index, count },
+            row: (index, count),
             ..self
         }
     }
@@ -144,7 +131,7 @@ const fn figure(
         number,
         title,
         quick_core_s,
-        row: Row::ALL,
+        row: (0, 1),
         make,
     }
 }

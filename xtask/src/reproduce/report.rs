@@ -500,7 +500,6 @@ fn origin(context: &Context) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figures::Row;
     use crate::profile::Profile;
 
     const WILD: &str = "<script>alert('x & \"y\"')</script>";
@@ -513,7 +512,7 @@ mod tests {
             number: 1,
             title: WILD,
             quick_core_s: 0.0,
-            row: Row::ALL,
+            row: (0, 1),
             make,
         };
         let drawn = figure("fig01");

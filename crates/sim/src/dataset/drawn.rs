@@ -50,19 +50,10 @@ pub(super) enum Origin {
     Expression(String),
 }
 
-/// A key that varies.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct DrawnKey {
-    /// As the plan writes it.
-    pub(super) name: String,
-    pub(super) key: SceneKey,
-    pub(super) origin: Origin,
-}
-
 /// All keys that vary, in the order in which they are drawn.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct DrawnKeys {
-    pub(super) keys: Vec<DrawnKey>,
+    pub(super) keys: Vec<(SceneKey, Origin)>,
     /// Rows of a table, and their weights.
     pub(super) rows: Vec<Vec<Value>>,
     pub(super) row_weights: Vec<f64>,
@@ -123,9 +114,9 @@ impl DrawnKeys {
         }
     }
 
-    fn place(&mut self, drawn: DrawnKey, expressions: &mut Vec<DrawnKey>) {
-        match drawn.origin {
-            Origin::Expression(_) => expressions.push(drawn),
+    fn place(&mut self, drawn: (SceneKey, Origin), expressions: &mut Vec<(SceneKey, Origin)>) {
+        match drawn {
+            (_, Origin::Expression(_)) => expressions.push(drawn),
             _ => self.keys.push(drawn),
         }
     }
@@ -180,28 +171,27 @@ impl DrawnKeys {
                 row.push(key.read(cell)?);
             }
             let origin = Origin::Row(self.rows[0].len() - 1);
-            let name = name.clone();
-            self.keys.push(DrawnKey { name, key, origin });
+            self.keys.push((key, origin));
         }
         self.rows_text = Some(text);
         Ok(())
     }
 
     fn refuse_repeated(&self, problems: &mut Vec<Problem>) {
-        for (index, drawn) in self.keys.iter().enumerate() {
+        for (index, (key, _)) in self.keys.iter().enumerate() {
             let mut before = self.keys[..index].iter();
-            if before.any(|other| other.key.path == drawn.key.path) {
+            if before.any(|(other, _)| other.path == key.path) {
                 let allowed =
                     "each key varies once, in [site], in [flight] or in the table of rows";
-                problems.push(Problem::new(&drawn.name, "", allowed));
+                problems.push(Problem::new(&key.name, "", allowed));
             }
         }
     }
 
     /// Refuses expressions that cannot be computed, and those with a key that is set after them.
     fn refuse_late(&self, problems: &mut Vec<Problem>) {
-        for (index, drawn) in self.keys.iter().enumerate() {
-            let Origin::Expression(text) = &drawn.origin else {
+        for (index, (key, origin)) in self.keys.iter().enumerate() {
+            let Origin::Expression(text) = origin else {
                 continue;
             };
             let found = RefCell::new(Vec::new());
@@ -215,14 +205,14 @@ impl DrawnKeys {
             );
             let value = format!("\"{text}\"");
             if let Err(why) = read {
-                problems.push(Problem::new(&drawn.name, &value, why));
+                problems.push(Problem::new(&key.name, &value, why));
             }
             let late = self.keys[index..]
                 .iter()
-                .find(|later| found.borrow().contains(&later.key.path));
-            if let Some(late) = late {
+                .find(|(later, _)| found.borrow().contains(&later.path));
+            if let Some((late, _)) = late {
                 let allowed = format!("keys that are set before: {} is not", late.name);
-                problems.push(Problem::new(&drawn.name, &value, allowed));
+                problems.push(Problem::new(&key.name, &value, allowed));
             }
         }
     }
@@ -231,14 +221,15 @@ impl DrawnKeys {
     pub(super) fn described(&self, values: &[Value]) -> String {
         let pairs = self.keys.iter().zip(values);
         let texts: Vec<String> = pairs
-            .map(|(drawn, value)| format!("{} = {value}", drawn.name))
+            .map(|((key, _), value)| format!("{} = {value}", key.name))
             .collect();
         texts.join(", ")
     }
 
     /// The number of a name among those that a key takes.
     pub(super) fn index_of(&self, index: usize, value: &Value) -> Option<usize> {
-        match &self.keys.get(index)?.origin {
+        let (_, origin) = self.keys.get(index)?;
+        match origin {
             Origin::Site(distribution, _) | Origin::Flight(distribution, _) => {
                 distribution.index_of(value)
             }
@@ -254,7 +245,7 @@ fn origin(
     value: &Value,
     dimension: &mut usize,
     of: fn(Distribution, usize) -> Origin,
-) -> Result<DrawnKey, Problem> {
+) -> Result<(SceneKey, Origin), Problem> {
     let key = varying(name, &value.to_string())?;
     let origin = match value {
         Value::String(text) => Origin::Expression(text.clone()),
@@ -263,11 +254,10 @@ fn origin(
             of(Distribution::read(name, &key, value)?, *dimension - 1)
         }
     };
-    let name = name.to_owned();
-    Ok(DrawnKey { name, key, origin })
+    Ok((key, origin))
 }
 
-/// A key of the scene that may vary.
+/// A key of the scene that may vary, by its name as the plan writes it.
 fn varying(name: &str, value: &str) -> Result<SceneKey, Problem> {
     let key = resolve(name.trim(), value)?;
     let is_of_shape = OF_SHAPE.contains(&key.path.as_str())
@@ -277,5 +267,8 @@ fn varying(name: &str, value: &str) -> Result<SceneKey, Problem> {
         let allowed = "a key that does not set lines, gates, times, velocities of the arrays or the seed: all flights share these, in [scene]";
         return Err(Problem::new(name, "", allowed));
     }
-    Ok(key)
+    Ok(SceneKey {
+        name: name.into(),
+        ..key
+    })
 }

@@ -183,11 +183,8 @@ fn add_truth(
         vec![pair.map_or(f64::NAN, |pair| pair.spacing_m)],
     );
     add("ready", vec![1.0]);
-    for (index, (drawn, value)) in of.drawn.keys.iter().zip(&flight.values).enumerate() {
-        add(
-            &name_of_key(&drawn.key.path),
-            vec![of.stored_value(index, value)],
-        );
+    for (index, ((key, _), value)) in of.drawn.keys.iter().zip(&flight.values).enumerate() {
+        add(&name_of_key(&key.path), vec![of.stored_value(index, value)]);
     }
     let wind = mean_wind_m_s(&flight.scene, &of.keys.heights_m)?;
     add("wind_x", wind.iter().map(|velocity| velocity[0]).collect());

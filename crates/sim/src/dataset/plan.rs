@@ -6,7 +6,7 @@
 //! Check: no two flights are equal; an appended distribution moves no other; every refusal of a plan.
 
 use super::draw;
-use super::drawn::{DrawnKey, DrawnKeys, Origin};
+use super::drawn::{DrawnKeys, Origin};
 use super::keys::PlanKeys;
 use crate::Error;
 use crate::io::{hash_of, text_file};
@@ -15,7 +15,7 @@ use crate::keys::{
 };
 use crate::scene::SceneFile;
 use crate::streams::stream;
-use crate::sweep::{expression, number_of_key, set, text_of};
+use crate::sweep::{SceneKey, expression, number_of_key, set, text_of};
 use rand_xoshiro::rand_core::Rng as _;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -175,8 +175,8 @@ impl DatasetPlan {
         let of_sites = stream(self.keys.seed, "sites", 0).next_u32();
         let row = draw::chosen(&self.drawn.row_weights, draw::uniform(point, 1, seed));
         let mut table = self.base.clone();
-        for (index, drawn) in self.drawn.keys.iter().enumerate() {
-            let value = match (&drawn.origin, replaced) {
+        for (index, (key, origin)) in self.drawn.keys.iter().enumerate() {
+            let value = match (origin, replaced) {
                 (_, Some((at, value))) if at == index => value.clone(),
                 (Origin::Site(distribution, dimension), _) => {
                     distribution.value(draw::uniform(site, *dimension, of_sites))
@@ -185,10 +185,10 @@ impl DatasetPlan {
                     distribution.value(draw::uniform(point, *dimension, seed))
                 }
                 (Origin::Row(column), _) => self.drawn.rows[row][*column].clone(),
-                (Origin::Expression(text), _) => self.computed(drawn, text, &table)?,
+                (Origin::Expression(text), _) => self.computed(key, text, &table)?,
             };
             values.push(value.clone());
-            set(&mut table, &drawn.key.path, value);
+            set(&mut table, &key.path, value);
         }
         if self.is_empty(number) {
             let calm = [("kind".to_owned(), Value::from("calm"))];
@@ -202,15 +202,15 @@ impl DatasetPlan {
     }
 
     /// The value of a key by its expression in the scene as it is so far.
-    fn computed(&self, drawn: &DrawnKey, text: &str, table: &Table) -> Result<Value, Error> {
+    fn computed(&self, key: &SceneKey, text: &str, table: &Table) -> Result<Value, Error> {
         let scene = SceneFile::without_limits(&text_of(table), &self.path)?;
         let whole = Value::Table(to_table(&scene));
         let refused = |allowed: String| {
-            let problem = Problem::new(&drawn.name, format!("\"{text}\""), allowed);
+            let problem = Problem::new(&key.name, format!("\"{text}\""), allowed);
             invalid(&self.path, located_by_name(&self.text, vec![problem]))
         };
         let number = expression::value(text, Some(&|name| number_of_key(&whole, name)));
-        let value = drawn.key.of_number(number.map_err(refused)?);
+        let value = key.of_number(number.map_err(refused)?);
         value.map_err(|problem| refused(format!("{} is {}", problem.allowed, problem.value)))
     }
 
@@ -224,9 +224,9 @@ impl DatasetPlan {
                     .drawn
                     .keys
                     .iter()
-                    .find(|drawn| drawn.key.path == problem.key);
+                    .find(|(key, _)| key.path == problem.key);
                 problem.line = match drawn {
-                    Some(drawn) => line_of_name(&self.text, &drawn.name),
+                    Some((key, _)) => line_of_name(&self.text, &key.name),
                     None => document.line(&format!("scene.{}", problem.key)),
                 };
             }
@@ -263,8 +263,8 @@ impl DatasetPlan {
         let number = of_site.into_iter().find(|flight| !self.is_empty(*flight));
         let number = number.unwrap_or(0);
         let mut flights = vec![self.flight(number)?];
-        for (index, drawn) in self.drawn.keys.iter().enumerate() {
-            if let Origin::Site(distribution, _) | Origin::Flight(distribution, _) = &drawn.origin {
+        for (index, (_, origin)) in self.drawn.keys.iter().enumerate() {
+            if let Origin::Site(distribution, _) | Origin::Flight(distribution, _) = origin {
                 for end in distribution.ends() {
                     flights.push(self.flight_with(number, Some((index, &end)))?);
                 }

@@ -333,11 +333,11 @@ impl Axes<'_> {
                 "distance between the vortices at their release",
             )?,
         ];
-        for drawn in &self.plan.drawn.keys {
-            let name = name_of_key(&drawn.key.path);
+        for (key, _) in &self.plan.drawn.keys {
+            let name = name_of_key(&key.path);
             let long_name = "value of the key that varies; of names their number";
             let array = self.of_flights((&name, "float64"), "", long_name)?;
-            all.push(array.with("key", drawn.key.path.as_str()));
+            all.push(array.with("key", key.path.as_str()));
         }
         let heights = ["flight", "height"];
         all.push(self.array(

@@ -1,6 +1,5 @@
 //! Elements of the page: signs as in print, badges, tables, pictures and their thumbnails.
 
-use crate::figures::Row;
 use fixtures::failure::Failure;
 use wakescope_sim::plot::escape;
 
@@ -223,8 +222,8 @@ impl<'s> Picture<'s> {
         }
     }
 
-    /// A row of its panels once more and small; the link about it has the words.
-    pub(super) fn thumbnail(&self, row: Row) -> String {
+    /// A row of its panels, of `rows`, once more and small; the link about it has the words.
+    pub(super) fn thumbnail(&self, (row, rows): (u32, u32)) -> String {
         let (id, view_box) = match self {
             Self::Drawing { id, view_box, .. } => (id, view_box),
             Self::Rows { csv, .. } => return thumbnail_of_csv(csv),
@@ -233,8 +232,8 @@ impl<'s> Picture<'s> {
         let [left, top, width, all_height] = size[..] else {
             return String::new();
         };
-        let height = all_height / f64::from(row.count);
-        let top = top + f64::from(row.index) * height;
+        let height = all_height / f64::from(rows);
+        let top = top + f64::from(row) * height;
         // As large as fits, and cut at its own border, beyond which the other rows are.
         let scale = (THUMBNAIL_SIZE[0] / width).min(THUMBNAIL_SIZE[1] / height);
         let [shown_width, shown_height] = [scale * width, scale * height];
@@ -274,9 +273,9 @@ mod tests {
         let full = picture.full("a <b>").unwrap();
         assert!(full.contains("<g id=\"picture-fig01\"><rect/></g>"));
         assert!(full.contains("aria-label=\"a &lt;b&gt;\""));
-        let thumbnail = picture.thumbnail(Row::ALL);
+        let thumbnail = picture.thumbnail((0, 1));
         assert!(thumbnail.contains("viewBox=\"0 0 2 1\"") && !thumbnail.contains("<rect"));
-        let lower = picture.thumbnail(Row { index: 1, count: 2 });
+        let lower = picture.thumbnail((1, 2));
         assert!(lower.contains("viewBox=\"0 0.5 2 0.5\""), "{lower}");
         assert!(Picture::new("fig01", "<svg><script></svg>").is_err());
     }
