@@ -8,7 +8,7 @@ pub(crate) fn raised(py: Python<'_>, refusal: &Refusal) -> PyErr {
     let class = py
         .import("wakescope")
         .and_then(|module| module.getattr("WakescopeError"));
-    match class.and_then(|class| class.call_method1("_of", (refusal.0.to_string(),))) {
+    match class.and_then(|class| class.call_method1("_of", (refusal.to_string(),))) {
         Ok(error) => PyErr::from_value(error),
         Err(error) => error,
     }

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::path::Path;
 use toml::{Table, Value};
-use wakescope_sim::cli::{Refusal, refusal};
+use wakescope_sim::cli::{refusal, refusal_of_value};
 use wakescope_sim::scene::{Problem, SceneFile, preset_names, preset_toml};
 
 /// Names of the lidars that `scene` knows.
@@ -31,7 +31,7 @@ pub(crate) fn scene<'py>(
             let allowed = format!("one of {}", known.join(", "));
             raised(
                 py,
-                &Refusal::from_problem(Problem::new("preset", name, allowed)),
+                &refusal_of_value(Problem::new("preset", name, allowed)),
             )
         })?,
     };

@@ -14,6 +14,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 use wakescope_estimate::Measured;
@@ -35,18 +36,8 @@ const LINES: usize = 60;
 /// Standard deviation of the weight of gates that do not resolve cores \[m\], as `retrieve` has it.
 const LONG_GATE_M: f64 = 3.0;
 
-/// Pairs of vortices and their secondary vortices; scenes with them have gates, noise and times of
-/// their own.
-#[derive(Deserialize)]
-struct WakeKind {
-    name: String,
-    #[serde(deserialize_with = "profile")]
-    profile: CoreProfile,
-    /// Least and largest height of the vortices \[m\].
-    height_m: [f64; 2],
-    /// Least and largest spacing of the vortices \[m\].
-    spacing_m: [f64; 2],
-}
+/// The kind of maps whose pairs are scanned in a scene, too, which has gates and noise of its own.
+const IN_SCENE: &str = "low Lamb-Oseen pairs, gates 4 m";
 
 /// A profile by its name in the list of kinds.
 fn profile<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<CoreProfile, D::Error> {
@@ -60,11 +51,16 @@ fn profile<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<CoreProf
     }
 }
 
-/// Maps of means over gates.
+/// Maps of means over gates of pairs of vortices and their secondary vortices.
 #[derive(Deserialize)]
 struct MapKind {
-    #[serde(flatten)]
-    wake: WakeKind,
+    name: String,
+    #[serde(deserialize_with = "profile")]
+    profile: CoreProfile,
+    /// Least and largest height of the vortices \[m\].
+    height_m: [f64; 2],
+    /// Least and largest spacing of the vortices \[m\].
+    spacing_m: [f64; 2],
     /// Whether the wakes have secondary vortices.
     secondary: bool,
     /// Standard deviation of the weight of gates; 0 for points \[m\].
@@ -74,13 +70,6 @@ struct MapKind {
     noise_m_s: f64,
     /// Duration of a scan \[s\].
     duration_s: f64,
-}
-
-/// Kinds whose maps are drawn, and whose scenes are run.
-#[derive(Deserialize)]
-struct Kinds {
-    map: Vec<MapKind>,
-    scene: Vec<WakeKind>,
 }
 
 /// Errors of one fitted vortex.
@@ -148,7 +137,7 @@ fn draw_normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
 }
 
 /// A pair, and the secondary vortices that belong to it.
-fn draw_wake(rng: &mut Xoshiro256PlusPlus, kind: &WakeKind) -> (Wake, [Vortex; 2]) {
+fn draw_wake(rng: &mut Xoshiro256PlusPlus, kind: &MapKind) -> (Wake, [Vortex; 2]) {
     let circulation_m2_s = draw_within(rng, [250.0, 550.0]);
     let spacing_m = draw_within(rng, kind.spacing_m);
     let height_m = draw_within(rng, kind.height_m);
@@ -231,10 +220,10 @@ fn empty_map(kind: &MapKind) -> ScanMap {
 /// One map, fitted as `retrieve` fits that of any instrument. Nothing where it does not show a pair.
 fn map_errors(kind: &MapKind, seed: u64) -> Result<Option<ScanErrors>, Failure> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let (truth, secondary) = draw_wake(&mut rng, &kind.wake);
+    let (truth, secondary) = draw_wake(&mut rng, kind);
     let options = options_of(kind);
     let mut true_options = options.clone();
-    true_options.model.profile = kind.wake.profile;
+    true_options.model.profile = kind.profile;
     true_options.model.secondary = kind.secondary.then_some(secondary);
     let mut map = empty_map(kind);
     map.velocity_m_s = expected_velocities(&map, &true_options, &truth, kind.duration_s > 0.0)?;
@@ -251,8 +240,8 @@ fn map_errors(kind: &MapKind, seed: u64) -> Result<Option<ScanErrors>, Failure> 
     let four = with_secondary(Secondary::Always)?.result;
     let scan = ScanErrors {
         shows_secondary: pair.has(Flag::SecondaryVortices),
-        pair: result_errors(&pair, &truth, kind.wake.profile),
-        four: result_errors(&four, &truth, kind.wake.profile),
+        pair: result_errors(&pair, &truth, kind.profile),
+        four: result_errors(&four, &truth, kind.profile),
     };
     Ok(scan.is_complete().then_some(scan))
 }
@@ -336,7 +325,7 @@ fn row_errors(rows: &[RetrievalRow]) -> Vec<Errors> {
 }
 
 /// A pair of a scene.
-fn pair_of_scene(kind: &WakeKind, seed: u64) -> Flow {
+fn pair_of_scene(kind: &MapKind, seed: u64) -> Flow {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let (wake, _) = draw_wake(&mut rng, kind);
     Flow::VortexPair(VortexPair {
@@ -385,19 +374,22 @@ fn print(name: &str, scans: &[ScanErrors]) {
 
 /// Draws and scans synthetic pairs.
 fn run_pairs(args: &FitTrialsArgs) -> Outcome {
-    let kinds: Kinds = toml::from_str(include_str!("secondary.toml"))?;
+    let kinds: BTreeMap<String, Vec<MapKind>> = toml::from_str(include_str!("secondary.toml"))?;
     let first_seed = args.seed.wrapping_mul(1 << 20);
-    for kind in &kinds.map {
+    for kind in kinds.values().flatten() {
         let scans: Vec<Option<ScanErrors>> = (0..args.scans)
             .into_par_iter()
             .map(|scan| map_errors(kind, first_seed + u64::from(scan)))
             .collect::<Result<_, Failure>>()?;
         let scans: Vec<ScanErrors> = scans.into_iter().flatten().collect();
-        print(&kind.wake.name, &scans);
+        print(&kind.name, &scans);
     }
-    for kind in &kinds.scene {
-        let flow = pair_of_scene(kind, args.seed);
-        print(&kind.name, &scene_errors(&flow, &root(), args)?);
+    for kind in kinds.values().flatten() {
+        if kind.name == IN_SCENE {
+            let flow = pair_of_scene(kind, args.seed);
+            let scans = scene_errors(&flow, &root(), args)?;
+            print("peaks, low Lamb-Oseen pair", &scans);
+        }
     }
     Ok(())
 }

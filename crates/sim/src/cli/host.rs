@@ -50,20 +50,17 @@ pub struct Answer {
 
 /// Why a command failed: the object that `--json` prints, with the whole text as `error`, and `problems`, each with its `file`,
 /// `line`, `key`, `value` and what is `allowed`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Refusal(pub Value);
+pub type Refusal = Value;
 
-impl Refusal {
-    /// For a value that is not allowed.
-    pub fn from_problem(problem: Problem) -> Self {
-        Self(as_object(
-            &SceneError::Invalid {
-                path: "scene".into(),
-                problems: vec![problem],
-            }
-            .into(),
-        ))
-    }
+/// The refusal of a value of a scene that is not allowed.
+pub fn refusal_of_value(problem: Problem) -> Refusal {
+    as_object(
+        &SceneError::Invalid {
+            path: "scene".into(),
+            problems: vec![problem],
+        }
+        .into(),
+    )
 }
 
 /// The refusal of an error; without `lines` where nobody wrote the text that has them.
@@ -73,7 +70,7 @@ pub fn refusal(mut error: Error, lines: bool) -> Refusal {
             problem.line = None;
         }
     }
-    Refusal(as_object(&error))
+    as_object(&error)
 }
 
 /// Runs a command in this process, with its arguments as after `wakescope`.
@@ -84,7 +81,7 @@ pub fn call(args: &[OsString], host: Host) -> Result<Answer, Refusal> {
     let args = [OsString::from("wakescope")]
         .into_iter()
         .chain(args.iter().cloned());
-    let mut cli = Cli::read(args).map_err(|error| Refusal(explained(&error)))?;
+    let mut cli = Cli::read(args).map_err(|error| explained(&error))?;
     let has_texts = !host.texts.is_empty();
     cli.quiet = true;
     cli.json = true;

@@ -41,7 +41,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use wakescope_optics::plan::Model;
 
-pub use host::{Answer, Host, Refusal, call, refusal};
+pub use host::{Answer, Host, Refusal, call, refusal, refusal_of_value};
 pub use options::command;
 
 /// Simulate coherent Doppler lidar measurements of aircraft wake vortices.

@@ -129,16 +129,8 @@ impl<'a> Text<'a> {
             found: Vec::new(),
             skipped,
         };
-        let table = walk.table(
-            format.keys,
-            &self.table,
-            Place {
-                path: "",
-                line: 1,
-                defaults: Some(format.defaults),
-            },
-            None,
-        );
+        let defaults = Some(format.defaults);
+        let table = walk.table(format.keys, &self.table, "", 1, defaults, None);
         if walk.found.is_empty() {
             return Ok((table, walk.skipped.unwrap_or_default()));
         }
@@ -262,14 +254,6 @@ type AllKinds = [(&'static str, Vec<Key>)];
 /// The tag of a table, the kind that it has, and all that it may have.
 type Kinds<'k> = (&'k str, &'k str, &'k AllKinds);
 
-/// Path and line of a value, and the keys that it has where the text omits them.
-#[derive(Clone, Copy)]
-struct Place<'p> {
-    path: &'p str,
-    line: usize,
-    defaults: Option<&'p toml::Table>,
-}
-
 struct Walk<'w> {
     document: &'w Text<'w>,
     format: &'w Format<'w>,
@@ -300,19 +284,16 @@ impl Walk<'_> {
         }
     }
 
-    /// A table with these keys; `kinds` are those of a table with a tag.
+    /// A table at a path and a line with these keys; it has `defaults` where the text omits them. `kinds` are those of a table with a tag.
     fn table(
         &mut self,
         keys: &[Key],
         table: &DeTable<'_>,
-        at: Place<'_>,
+        path: &str,
+        line: usize,
+        defaults: Option<&toml::Table>,
         kinds: Option<Kinds<'_>>,
     ) -> toml::Table {
-        let Place {
-            path,
-            line,
-            defaults,
-        } = at;
         let mut out = toml::Table::new();
         for (name, value) in table {
             let here = name.get_ref().as_ref();
@@ -320,12 +301,8 @@ impl Walk<'_> {
             match keys.iter().find(|key| key.name == here) {
                 Some(key) => {
                     let defaults = defaults.and_then(|all| all.get(here)?.as_table());
-                    let place = Place {
-                        path: &join(path, here),
-                        line,
-                        defaults,
-                    };
-                    if let Some(value) = self.value(&key.kind, value, place) {
+                    let path = join(path, here);
+                    if let Some(value) = self.value(&key.kind, value, &path, line, defaults) {
                         out.insert(here.to_owned(), value);
                     }
                 }
@@ -363,7 +340,15 @@ impl Walk<'_> {
         self.refuse(path, Problem::ABSENT.into(), allowed, line);
     }
 
-    fn value(&mut self, kind: &Kind, value: &Spanned<DeValue<'_>>, at: Place<'_>) -> Option<Value> {
+    /// A value at a path and a line; a table has `defaults` where the text omits its keys.
+    fn value(
+        &mut self,
+        kind: &Kind,
+        value: &Spanned<DeValue<'_>>,
+        path: &str,
+        line: usize,
+        defaults: Option<&toml::Table>,
+    ) -> Option<Value> {
         let inner = value.get_ref();
         let read = match (kind, inner) {
             (Kind::Number, _) => number(inner).map(Value::Float),
@@ -381,31 +366,25 @@ impl Walk<'_> {
                 // Each value that does not fit is named itself.
                 let mut list = Vec::with_capacity(values.len());
                 for (i, value) in values.iter().enumerate() {
-                    let path = &format!("{}[{i}]", at.path);
                     let line = self.document.line_of(&value.span());
-                    list.extend(self.value(
-                        of,
-                        value,
-                        Place {
-                            path,
-                            line,
-                            defaults: None,
-                        },
-                    ));
+                    list.extend(self.value(of, value, &format!("{path}[{i}]"), line, None));
                 }
                 return Some(Value::Array(list));
             }
             (Kind::Table(keys), DeValue::Table(table)) => {
-                return Some(Value::Table(self.table(keys, table, at, None)));
+                return Some(Value::Table(
+                    self.table(keys, table, path, line, defaults, None),
+                ));
             }
             (Kind::Tagged { tag, kinds }, DeValue::Table(table)) => {
-                return self.tagged(tag, kinds, table, at).map(Value::Table);
+                let table = self.tagged(tag, kinds, table, path, line, defaults);
+                return table.map(Value::Table);
             }
             _ => None,
         };
         if read.is_none() {
-            let allowed = self.wanted(at.path, kind, inner.as_str().unwrap_or_default());
-            self.refuse(at.path.to_owned(), self.shown(value), allowed, at.line);
+            let allowed = self.wanted(path, kind, inner.as_str().unwrap_or_default());
+            self.refuse(path.to_owned(), self.shown(value), allowed, line);
         }
         read
     }
@@ -415,35 +394,26 @@ impl Walk<'_> {
         tag: &str,
         kinds: &AllKinds,
         table: &DeTable<'_>,
-        at: Place<'_>,
+        path: &str,
+        line: usize,
+        defaults: Option<&toml::Table>,
     ) -> Option<toml::Table> {
-        let of_default = at.defaults.and_then(|d| d.get(tag)).and_then(Value::as_str);
-        let path = &join(at.path, tag);
+        let of_default = defaults.and_then(|d| d.get(tag)).and_then(Value::as_str);
+        let tag_path = join(path, tag);
         let name = match (
             table.iter().find(|(key, _)| key.get_ref() == tag),
             of_default,
         ) {
             (Some((key, value)), _) => {
                 let line = self.document.line_of(&key.span());
-                self.value(
-                    &Kind::Choice(names(kinds)),
-                    value,
-                    Place {
-                        path,
-                        line,
-                        defaults: None,
-                    },
-                )?;
+                let kind = Kind::Choice(names(kinds));
+                self.value(&kind, value, &tag_path, line, None)?;
                 value.get_ref().as_str()?
             }
             (None, Some(name)) => name,
             (None, None) => {
-                self.refuse(
-                    path.clone(),
-                    Problem::ABSENT.into(),
-                    one_of(&names(kinds), ""),
-                    at.line,
-                );
+                let allowed = one_of(&names(kinds), "");
+                self.refuse(tag_path, Problem::ABSENT.into(), allowed, line);
                 return None;
             }
         };
@@ -451,13 +421,9 @@ impl Walk<'_> {
             .iter()
             .find(|(n, _)| *n == name)
             .map_or(&[][..], |(_, keys)| keys);
-        let defaults = at.defaults.filter(|_| of_default == Some(name));
-        let mut out = self.table(
-            keys,
-            table,
-            Place { defaults, ..at },
-            Some((tag, name, kinds)),
-        );
+        let defaults = defaults.filter(|_| of_default == Some(name));
+        let kinds = Some((tag, name, kinds));
+        let mut out = self.table(keys, table, path, line, defaults, kinds);
         out.insert(tag.to_owned(), Value::String(name.to_owned()));
         Some(out)
     }

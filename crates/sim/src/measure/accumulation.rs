@@ -9,25 +9,19 @@
 use crate::plan::{Plan, Target};
 use crate::scene::{Accumulation, RetrievalMethod};
 
-/// How the pulses of a scan are accumulated.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Pulses {
-    /// Their products are drawn at once.
-    Drawn,
-    /// Each has a record; with the reason where draws would be cheaper.
-    Records(Option<String>),
+/// Whether the products of all pulses of a line are drawn at once; else each pulse has a record.
+pub(crate) fn draws_products(plan: &Plan) -> bool {
+    !are_records_cheaper(plan) && reason_for_records(plan).is_none()
 }
 
-/// How a plan accumulates pulses.
-pub(crate) fn of_pulses(plan: &Plan) -> Pulses {
+/// Why each pulse has a record although draws would be cheaper; `None` where they would not, or are made.
+pub(crate) fn reason_against_draws(plan: &Plan) -> Option<String> {
+    reason_for_records(plan).filter(|_| !are_records_cheaper(plan))
+}
+
+fn are_records_cheaper(plan: &Plan) -> bool {
     let pulses = plan.counts.records / plan.counts.lines;
-    if pulses * record_s(plan) < factor_s(plan) + draw_s(plan) {
-        return Pulses::Records(None);
-    }
-    match reason_for_records(plan) {
-        Some(reason) => Pulses::Records(Some(reason)),
-        None => Pulses::Drawn,
-    }
+    pulses * record_s(plan) < factor_s(plan) + draw_s(plan)
 }
 
 /// Why a plan needs the record of each pulse; `None` if it does not.

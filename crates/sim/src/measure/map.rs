@@ -1,7 +1,7 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
 use crate::Error;
-use crate::measure::accumulation::{Pulses, lags_per_window, of_pulses};
+use crate::measure::accumulation::{draws_products, lags_per_window};
 use crate::measure::error_law::{ErrorLaw, ScanErrors, shared_cells};
 use crate::measure::gate_estimates::GateSums;
 use crate::measure::map_estimator::{MapEstimator, PointNoise, WindowSums};
@@ -280,7 +280,7 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::Sample>(
     seen: impl FnMut(&RealisationMap<'_>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let kept_realisations = plans.first().map_or(0, |plan| plan.kept_realisations());
-    if plans.iter().all(|plan| of_pulses(plan) == Pulses::Drawn) {
+    if plans.iter().all(|plan| draws_products(plan)) {
         let realisations = plans.first().map_or(0, |plan| plan.realisations());
         let lags = plans.iter().map(|plan| lags_per_window(plan)).max();
         let draws = LineDraws::<S>::new(scanner, lags.unwrap_or(0), realisations)?;

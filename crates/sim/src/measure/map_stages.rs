@@ -1,7 +1,7 @@
 //! The stages of the map: estimates and their errors; what each needs.
 
 use crate::Error;
-use crate::measure::accumulation::{Pulses, lags_per_window, of_pulses};
+use crate::measure::accumulation::{draws_products, lags_per_window};
 use crate::measure::region;
 use crate::measure::scan_stages::{scan_bytes, wind_bytes};
 use crate::plan::{Plan, PlannedStage, Stage};
@@ -165,9 +165,10 @@ fn estimates_s(plan: &Plan) -> f64 {
     let planned_s = 4e-8 * (method.covariances() * window.powi(3) + bounded);
     let pictures_s = 0.12 * f64::from(u8::from(scene.outputs.svg) + u8::from(scene.outputs.png));
     let windows = n.realisations * windows_per_record(plan);
-    let windows_s = match of_pulses(plan) {
-        Pulses::Drawn => windows * n.lines * numbers * window * 4e-10,
-        Pulses::Records(_) => windows * n.records * window_s,
+    let windows_s = if draws_products(plan) {
+        windows * n.lines * numbers * window * 4e-10
+    } else {
+        windows * n.records * window_s
     };
     windows_s + points_s + planned_s + n.cells * 3e-6 + pictures_s
 }

@@ -2,7 +2,9 @@
 
 use crate::Error;
 use crate::measure::accumulation::lags_per_window;
-use crate::measure::accumulation::{Pulses, draw_s, factor_bytes, factor_s, of_pulses, record_s};
+use crate::measure::accumulation::{
+    draw_s, draws_products, factor_bytes, factor_s, reason_against_draws, record_s,
+};
 use crate::measure::efficiency_model::drawn_turbulence;
 use crate::measure::scan::products::{kept_factors, lines_at_once};
 use crate::measure::scan::{WINDS_BYTES, records_at_once};
@@ -44,18 +46,18 @@ pub(crate) fn signals(plan: &Plan) -> PlannedStage {
     let n = &plan.counts;
     let scan = &plan.scene().scan;
     let g = &plan.geometry;
-    let reason = match of_pulses(plan) {
-        Pulses::Drawn => format!(
+    let reason = if draws_products(plan) {
+        format!(
             "{} x {} lines of {} samples, products of all pulses drawn at once",
             n.realisations, n.lines, g.samples
-        ),
-        Pulses::Records(why) => {
-            let why = why.map_or(String::new(), |why| format!("; not drawn at once: {why}"));
-            format!(
-                "{} x {} records of {} samples, {} layers each{why}",
-                n.realisations, n.records, g.samples, n.layers_per_sample
-            )
-        }
+        )
+    } else {
+        let why = reason_against_draws(plan);
+        let why = why.map_or(String::new(), |why| format!("; not drawn at once: {why}"));
+        format!(
+            "{} x {} records of {} samples, {} layers each{why}",
+            n.realisations, n.records, g.samples, n.layers_per_sample
+        )
     };
     let kept_line_bytes = if n.kept > 0.0 {
         n.lines * n.layers * 8.0
@@ -90,12 +92,11 @@ pub(crate) fn noise(plan: &Plan) -> PlannedStage {
         return PlannedStage::skipped(Stage::Noise, "detector.noise is \"none\"");
     }
     let n = &plan.counts;
-    let reason = match of_pulses(plan) {
-        Pulses::Drawn => "in the products".into(),
-        Pulses::Records(_) => {
-            let values = n.realisations * n.records * n.samples * n.parts;
-            format!("{values} samples")
-        }
+    let reason = if draws_products(plan) {
+        "in the products".into()
+    } else {
+        let values = n.realisations * n.records * n.samples * n.parts;
+        format!("{values} samples")
     };
     PlannedStage::running(Stage::Noise, reason).with_memory(0.0, 0.0, fewer_layers(plan))
 }
@@ -121,7 +122,7 @@ pub(crate) fn wind_bytes(plan: &Plan) -> f64 {
 /// the factors of lines, for each thread the matrices of one, and a piece of products.
 pub(crate) fn scan_bytes(plan: &Plan) -> f64 {
     let n = &plan.counts;
-    if of_pulses(plan) == Pulses::Drawn {
+    if draws_products(plan) {
         let products_bytes = n.samples * n.parts * 8.0 * lags_per_window(plan) as f64;
         let at_once = lines_at_once(plan.geometry.elevation_rad.len(), products_bytes as usize);
         // Beside the factor the covariance of the envelope, that of the record, the triangle and
@@ -155,12 +156,11 @@ fn signals_s(plan: &Plan) -> f64 {
     };
     let winds = n.lines * winds_per_line as f64;
     let kept_s = n.kept * n.records * n.samples * n.parts * 4e-8;
-    let made_s = match of_pulses(plan) {
-        Pulses::Drawn => {
-            let again = (n.lines - kept_lines(plan)) * (n.realisations - 1.0);
-            (n.lines + again) * factor_s(plan) + n.realisations * n.lines * draw_s(plan)
-        }
-        Pulses::Records(_) => n.realisations * n.records * record_s(plan),
+    let made_s = if draws_products(plan) {
+        let again = (n.lines - kept_lines(plan)) * (n.realisations - 1.0);
+        (n.lines + again) * factor_s(plan) + n.realisations * n.lines * draw_s(plan)
+    } else {
+        n.realisations * n.records * record_s(plan)
     };
     made_s + n.realisations * winds * n.layers * wind_s + kept_s
 }

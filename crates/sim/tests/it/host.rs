@@ -131,7 +131,7 @@ fn signals_of_an_array_give_the_map_of_those_of_a_file() {
     assert_eq!(scaled.files, of_file.files);
     let none = run(&words("signals"), SCENE, Some(of(1.0, 0)), true).unwrap_err();
     assert!(
-        none.0["error"].as_str().unwrap().contains("no records"),
+        none["error"].as_str().unwrap().contains("no records"),
         "{none:?}"
     );
 }
@@ -144,8 +144,7 @@ fn refusals_are_objects_with_key_value_and_limit_and_no_line_of_a_text_that_nobo
         None,
         true,
     )
-    .unwrap_err()
-    .0;
+    .unwrap_err();
     let problem = &refused["problems"][0];
     assert_eq!(problem["key"], "scan.realisations");
     assert!(
@@ -170,7 +169,7 @@ fn refusals_are_objects_with_key_value_and_limit_and_no_line_of_a_text_that_nobo
         None,
         true,
     );
-    let problem = &word.unwrap_err().0["problems"][0];
+    let problem = &word.unwrap_err()["problems"][0];
     assert_eq!(
         (problem["key"].as_str(), problem["value"].as_str()),
         (Some("--false-alarm <RATE>"), Some("0.7"))
