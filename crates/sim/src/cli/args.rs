@@ -94,32 +94,7 @@ pub(super) struct ScanArgs {
     #[arg(long, value_name = "A", value_parser = positive)]
     scale: Option<f64>,
     #[command(flatten)]
-    velocities: VelocityArgs,
-}
-
-/// How velocities of files are read.
-#[derive(Debug, Args)]
-pub(super) struct VelocityArgs {
-    /// Variable or column of the velocities.
-    #[arg(long, value_name = "NAME")]
-    field: Option<String>,
-    /// Velocities are positive, or frequencies rise, towards the lidar.
-    #[arg(long)]
-    towards: bool,
-    /// Skip velocities below this signal-to-noise ratio in dB.
-    #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = finite)]
-    min_snr: Option<f64>,
-}
-
-impl VelocityArgs {
-    pub(super) fn format(&self) -> ScanFormat {
-        ScanFormat {
-            field: self.field.clone(),
-            towards: self.towards,
-            min_snr_db: self.min_snr,
-            ignores_status: false,
-        }
-    }
+    pub(super) velocities: ScanFormat,
 }
 
 /// What a file of scans holds.
@@ -140,11 +115,6 @@ pub(super) struct Signals {
 }
 
 impl ScanArgs {
-    /// How velocities are read.
-    pub(super) fn format(&self) -> ScanFormat {
-        self.velocities.format()
-    }
-
     /// The scans of a file; raw signals go through the estimator of the scene, whose spectra are kept if requested.
     pub(super) fn read(
         &self,
@@ -156,7 +126,7 @@ impl ScanArgs {
         if is_signals(path) {
             return self.signals(path, scene, spectra, observer);
         }
-        let (maps, left_out) = scans::read(path, &self.format())?;
+        let (maps, left_out) = scans::read(path, &self.velocities)?;
         Ok(Scans {
             maps,
             left_out,
@@ -263,10 +233,6 @@ fn two<T: FromStr>(
         .split_once(',')
         .and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
     both.filter(are_allowed).ok_or_else(|| allowed.to_owned())
-}
-
-pub(super) fn finite(word: &str) -> Result<f64, String> {
-    read(word, |value: &f64| value.is_finite(), "a number, e.g. 1.5")
 }
 
 pub(super) fn not_negative(word: &str) -> Result<f64, String> {

@@ -1,7 +1,7 @@
 //! `wakescope detect`: whether scans hold a wake, and how small a wake is found in scans like them.
 
 use super::Cli;
-use super::args::{AirArgs, FolderArgs, ScanArgs, finite, rate, refuse_idle, spacing, stride};
+use super::args::{AirArgs, FolderArgs, ScanArgs, rate, refuse_idle, spacing, stride};
 use super::data_files::each_usable;
 use super::data_sets::{self, SplitArgs, data_set_of};
 use super::options::{ON_DATA_SET, WITHOUT_DATA_SET, WITHOUT_SCANS, refusal_of_idle};
@@ -13,7 +13,7 @@ use crate::detection::{
 };
 use crate::io::Provenance;
 use crate::io::csv::digits;
-use crate::io::scans::ReadScan;
+use crate::io::scans::{ReadScan, finite};
 use crate::outputs::Outputs;
 use crate::plan::{Plan, Stage, Target};
 use crate::progress::{Observer, Silent};
@@ -159,7 +159,7 @@ fn of_data_set(args: &DetectArgs, folder: &Path, cli: &Cli) -> Result<(), Error>
     let (found, origin) = data_sets::predict(
         folder,
         &splits,
-        &args.scans.format(),
+        &args.scans.velocities,
         (Stage::Detection, &*observer),
         |flight, scene, scans| of_flight((args, cli.seed), (flight, scene), scans, &*observer),
     )?;

@@ -295,7 +295,7 @@ fn of_data_set(args: &RetrieveArgs, folder: &Path, cli: &Cli) -> Result<(), Erro
     let (found, origin) = data_sets::predict(
         folder,
         &splits,
-        &args.scans.format(),
+        &args.scans.velocities,
         (Stage::Retrieval, &*observer),
         |flight, scene, scans| of_flight(args, (flight, scene), scans, &*observer),
     )?;

@@ -1,7 +1,7 @@
 //! `wakescope wind`: wind over height and turbulence from scans of any instrument.
 
 use super::Cli;
-use super::args::{FolderArgs, VelocityArgs, horizontal_wind, is_signals, not_negative, positive};
+use super::args::{FolderArgs, horizontal_wind, is_signals, not_negative, positive};
 use super::data_files::each_usable;
 use super::options::{OF_FULL_WINDS, OF_WINDS, WITHOUT_STATUS};
 use crate::Error;
@@ -48,7 +48,7 @@ pub(super) struct WindArgs {
     #[arg(long)]
     use_status: bool,
     #[command(flatten)]
-    velocities: VelocityArgs,
+    velocities: ScanFormat,
     #[command(flatten)]
     folder: FolderArgs,
 }
@@ -83,7 +83,7 @@ pub(super) fn wind(args: &WindArgs, cli: &Cli) -> Result<(), Error> {
     let observer = cli.observer();
     let format = ScanFormat {
         ignores_status: !args.use_status,
-        ..args.velocities.format()
+        ..args.velocities.clone()
     };
     let read = each_usable(&args.data, &*observer, |path| match is_signals(path) {
         true => Err(Error::input(path, SIGNALS)),

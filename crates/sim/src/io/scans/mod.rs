@@ -30,15 +30,32 @@ use wakescope_estimate::retrieval::ScanMap;
 
 /// What a file does not say of its velocities.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct ScanFormat {
-    /// The variable or column that holds the velocities.
+    /// Variable or column of the velocities.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "NAME"))]
     pub field: Option<String>,
-    /// Whether velocities are positive towards the lidar.
+    /// Velocities are positive, or frequencies rise, towards the lidar.
+    #[cfg_attr(feature = "cli", arg(long))]
     pub towards: bool,
-    /// Least signal-to-noise ratio, dB, where the file has one.
+    /// Skip velocities below this signal-to-noise ratio in dB.
+    #[cfg_attr(
+        feature = "cli",
+        arg(long = "min-snr", value_name = "DB", allow_negative_numbers = true, value_parser = finite)
+    )]
     pub min_snr_db: Option<f64>,
     /// Whether velocities that the instrument does not trust are read all the same.
+    #[cfg_attr(feature = "cli", arg(skip))]
     pub ignores_status: bool,
+}
+
+/// A finite number of the command line.
+#[cfg(feature = "cli")]
+pub(crate) fn finite(word: &str) -> Result<f64, String> {
+    let number = word.trim().parse().ok();
+    number
+        .filter(|value: &f64| value.is_finite())
+        .ok_or_else(|| "a number, e.g. 1.5".into())
 }
 
 impl ScanFormat {
