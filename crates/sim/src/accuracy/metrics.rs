@@ -86,7 +86,7 @@ impl Jackknife {
     }
 }
 
-/// Results of a run, realisation by realisation.
+/// Results of a run, realisation by realisation, and its run time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sample {
     /// Efficiency in the middle of the scan, by independent groups of realisations of the path.
@@ -97,6 +97,11 @@ pub(super) struct Sample {
     offset_m_s: Vec<f64>,
     wind_m_s: Vec<[f64; 3]>,
     circulation_m2_s: Vec<f64>,
+    /// Exact relative shift of the bistatic efficiency by the phase screens, in the middle of the scan and the largest over its stretch.
+    pub(super) layer_shift: [f64; 2],
+    /// Wall time of efficiencies, and of signals and map, s.
+    pub(super) optics_s: f64,
+    pub(super) map_s: f64,
 }
 
 impl Sample {

@@ -123,17 +123,6 @@ fn middle_stretch(plan: &Plan) -> Option<[f64; 2]> {
         .map(|(ends_m, _)| *ends_m)
 }
 
-/// A run of a scene.
-#[derive(Debug, Clone, Default)]
-struct SceneTrial {
-    sample: Sample,
-    /// Exact relative shift of the bistatic efficiency by the phase screens, in the middle of the scan and the largest over its stretch.
-    layer_shift: [f64; 2],
-    /// Wall time of efficiencies, and of signals and map, s.
-    optics_s: f64,
-    map_s: f64,
-}
-
 /// Runs of a scene with other values of its settings.
 struct Study<'a> {
     file: &'a SceneFile,
@@ -143,7 +132,7 @@ struct Study<'a> {
     observer: &'a dyn Observer,
     common: Common,
     /// The run with the given values.
-    given: SceneTrial,
+    given: Sample,
     /// Shift of metrics of the map for a relative shift of the efficiency of their signals.
     response: Vec<(Metric, Measured)>,
 }
@@ -164,12 +153,12 @@ impl<'a> Study<'a> {
             base,
             observer,
             common,
-            given: SceneTrial::default(),
+            given: Sample::default(),
             response: Vec::new(),
         };
         study.given = study.run(&study.base)?;
         // Circulation is fitted to scans across a pair alone.
-        available.retain(|metric| study.given.sample.noise(*metric).is_finite());
+        available.retain(|metric| study.given.noise(*metric).is_finite());
         study.metrics = request.select("scene", &available)?;
         if signals_cross_screens(&study.base.content) && crosses_screens(&plan) {
             study.response = study.measured_response()?;
@@ -183,7 +172,7 @@ impl<'a> Study<'a> {
     }
 
     /// Runs a scene up to its map.
-    fn run(&self, file: &SceneFile) -> Result<SceneTrial, Error> {
+    fn run(&self, file: &SceneFile) -> Result<Sample, Error> {
         let plan = self.common.plan(file, Target::Run)?;
         plan.fits()?;
         let begun = Instant::now();
@@ -204,22 +193,20 @@ impl<'a> Study<'a> {
             None => Sample::default(),
         };
         sample.efficiency = efficiency;
-        Ok(SceneTrial {
-            sample,
-            layer_shift: layer_shift(&plan),
-            optics_s,
-            map_s: begun.elapsed().as_secs_f64(),
-        })
+        sample.layer_shift = layer_shift(&plan);
+        sample.optics_s = optics_s;
+        sample.map_s = begun.elapsed().as_secs_f64();
+        Ok(sample)
     }
 
     /// What a change of the efficiency does to the metrics of the map.
     fn measured_response(&self) -> Result<Vec<(Metric, Measured)>, Error> {
         let mut scene = self.base.content.clone();
         scene.pulse.energy_j *= 1.0 + RAISED;
-        let raised = self.run(&self.base.with(scene)?)?.sample;
+        let raised = self.run(&self.base.with(scene)?)?;
         let mut response = Vec::new();
         for metric in self.of_map() {
-            let shift = raised.shift(&self.given.sample, metric);
+            let shift = raised.shift(&self.given, metric);
             response.push((metric, shift.times(Measured::exact(1.0 / RAISED))));
         }
         Ok(response)
@@ -259,7 +246,7 @@ impl<'a> Study<'a> {
     fn setting(&self, key: &'static str, values: &[f64]) -> Setting {
         let given = value(&self.file.content, key);
         let of_base = value(&self.base.content, key);
-        let mut finest: Option<SceneTrial> = None;
+        let mut finest: Option<Sample> = None;
         let mut rows = Vec::new();
         for &value in values {
             let trial = if value == of_base {
@@ -286,7 +273,7 @@ impl<'a> Study<'a> {
                         // A known gate has an estimate in every realisation: of more of them fewer are known.
                         lost: match key {
                             REALISATIONS => 0.0,
-                            _ => trial.sample.lost(&finest.sample),
+                            _ => trial.lost(finest),
                         },
                         ..Row::new(value, label, optics_s + trial.map_s)
                     }
@@ -302,8 +289,8 @@ impl<'a> Study<'a> {
         &self,
         key: &str,
         ratio: f64,
-        trial: &SceneTrial,
-        finest: &SceneTrial,
+        trial: &Sample,
+        finest: &Sample,
     ) -> Vec<(Metric, Measured)> {
         let mut shifts = Vec::new();
         match key {
@@ -312,7 +299,7 @@ impl<'a> Study<'a> {
                 self.by_efficiency(middle, largest)
             }
             GRID_POINTS | GRID_SPACING => {
-                let shift = trial.sample.shift(&finest.sample, Metric::Efficiency);
+                let shift = trial.shift(finest, Metric::Efficiency);
                 self.by_efficiency(shift, shift)
             }
             PATHS => {
@@ -327,7 +314,7 @@ impl<'a> Study<'a> {
             }
             _ => {
                 for metric in self.of_map() {
-                    shifts.push((metric, trial.sample.shift(&finest.sample, metric)));
+                    shifts.push((metric, trial.shift(finest, metric)));
                 }
                 shifts
             }
@@ -338,7 +325,7 @@ impl<'a> Study<'a> {
     fn noise(&self, metric: Metric, ratio: f64) -> Measured {
         Measured {
             value: 0.0,
-            std: self.given.sample.noise(metric) * ratio.sqrt(),
+            std: self.given.noise(metric) * ratio.sqrt(),
         }
     }
 
