@@ -26,7 +26,6 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
-use truth::Extent;
 use wakescope_sim::io::{Existing, Provenance, Table, VelocityMap, cfradial, hpl};
 use wakescope_sim::write_contents;
 
@@ -118,8 +117,8 @@ fn files_of_scan(cases: &Cases, case: &ScanCase, folder: &Path) -> Result<Vec<Se
     let plan = wakescope_sim::Plan::new(scene, wakescope_sim::Target::Map)?;
     let scan = Scan::new(plan, case)?;
     let mut files = Vec::new();
-    // Names of the truth, the extent of the files that share it, and their cases.
-    let mut truths: BTreeMap<String, (Extent, BTreeMap<String, u32>)> = BTreeMap::new();
+    // Names of the truth, first and last ray of the files that share it, and their cases.
+    let mut truths: BTreeMap<String, ((usize, usize), BTreeMap<String, u32>)> = BTreeMap::new();
     for (name, number) in &case.files {
         let turns = if name.contains('N') {
             scan.map.sweeps.len()
@@ -144,19 +143,25 @@ fn files_of_scan(cases: &Cases, case: &ScanCase, folder: &Path) -> Result<Vec<Se
                 }
                 _ => content(&scan, case, &name, turn)?,
             };
-            let extent = extent(&scan, file.format, turn, turns);
+            let rays = rays_of_turn(&scan, turn, turns);
             let entry = truths.entry(truth_stem(&name).to_owned());
             entry
-                .or_insert((extent, BTreeMap::new()))
+                .or_insert((rays, BTreeMap::new()))
                 .1
                 .insert(name, *number);
             files.push(file);
         }
     }
-    for (stem, (extent, of_truth)) in truths {
+    for (stem, (rays, of_truth)) in truths {
         let case = of_truth.values().copied().min().unwrap_or_default();
-        let json = truth::json_text(&scan, &extent, &json!(of_truth))?;
-        for (ending, text) in [("json", json), ("csv", truth::csv(&scan, &extent))] {
+        let gates_before = if stem.ends_with(".hpl") {
+            gates_before(&scan.map)
+        } else {
+            0
+        };
+        let json = truth::json_text(&scan, rays, gates_before, &json!(of_truth))?;
+        let csv = truth::csv(&scan, rays, gates_before);
+        for (ending, text) in [("json", json), ("csv", csv)] {
             files.push(SetFile {
                 name: format!("{stem}.truth.{ending}"),
                 format: "truth",
@@ -192,16 +197,12 @@ fn format_of(name: &str) -> Result<&'static str, Failure> {
     Err(Failure::new(format!("{name} has no ending of a format")))
 }
 
-fn extent(scan: &Scan, format: &str, turn: usize, turns: usize) -> Extent {
-    let last = scan.map.rays.len() - 1;
-    let of_turn = scan.map.sweep_bounds()[turn];
-    Extent {
-        rays: if turns > 1 { of_turn } else { (0, last) },
-        gates_before: if format == "HALO" {
-            gates_before(&scan.map)
-        } else {
-            0
-        },
+/// First and last ray of the file of a turn, or of the whole scan.
+fn rays_of_turn(scan: &Scan, turn: usize, turns: usize) -> (usize, usize) {
+    if turns > 1 {
+        scan.map.sweep_bounds()[turn]
+    } else {
+        (0, scan.map.rays.len() - 1)
     }
 }
 

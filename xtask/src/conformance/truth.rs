@@ -21,21 +21,12 @@ const HEIGHTS: usize = 25;
 /// Elevations whose gates have a height of their own in the wind.
 const FEW_ELEVATIONS: usize = 3;
 
-/// Rays of a scan that a file holds, and the number that the first gate of the map has in it.
-pub(super) struct Extent {
-    /// First and last ray.
-    pub(super) rays: (usize, usize),
-    /// Gates of the file before the first one of the map.
-    pub(super) gates_before: usize,
-}
-
 /// The true velocities: `ray,gate,true_m_s`, numbered as in the file.
-pub(super) fn csv(scan: &Scan, extent: &Extent) -> String {
-    let (first, last) = extent.rays;
+pub(super) fn csv(scan: &Scan, (first, last): (usize, usize), gates_before: usize) -> String {
     let mut out = String::from("ray,gate,true_m_s\n");
     for ray in first..=last {
         for (gate, true_m_s) in scan.true_m_s.row(ray).iter().enumerate() {
-            let gate = gate + extent.gates_before;
+            let gate = gate + gates_before;
             // Writing to a text cannot fail.
             let _ = writeln!(out, "{},{gate},{true_m_s:.6}", ray - first);
         }
@@ -44,10 +35,14 @@ pub(super) fn csv(scan: &Scan, extent: &Extent) -> String {
 }
 
 /// All else that is known, as JSON with a line for each name.
-pub(super) fn json_text(scan: &Scan, extent: &Extent, files: &Value) -> Result<String, Failure> {
+pub(super) fn json_text(
+    scan: &Scan,
+    (first, last): (usize, usize),
+    gates_before: usize,
+    files: &Value,
+) -> Result<String, Failure> {
     let scene = scan.plan.scene();
     let map = &scan.map;
-    let (first, last) = extent.rays;
     let rays = &map.rays[first..=last];
     let eddies = scene.added_flows.iter().find_map(|flow| match flow {
         Flow::Eddies(eddies) => Some(eddies),
@@ -86,7 +81,7 @@ pub(super) fn json_text(scan: &Scan, extent: &Extent, files: &Value) -> Result<S
         ("missing", json!(missing)),
         ("sweep_modes", json!(sweeps)),
     ];
-    entries.extend(geometry(scan, extent, rays));
+    entries.extend(geometry(scan, gates_before, rays));
     entries.extend([
         ("version", json!(wakescope_sim::VERSION)),
         ("scene", json!(scan.plan.file.toml)),
@@ -101,7 +96,7 @@ pub(super) fn json_text(scan: &Scan, extent: &Extent, files: &Value) -> Result<S
 }
 
 /// Times and directions of the rays, and the centres of the gates.
-fn geometry(scan: &Scan, extent: &Extent, rays: &[Ray]) -> Vec<(&'static str, Value)> {
+fn geometry(scan: &Scan, gates_before: usize, rays: &[Ray]) -> Vec<(&'static str, Value)> {
     let map = &scan.map;
     vec![
         ("start_utc", json!(map.site.start_utc)),
@@ -120,7 +115,7 @@ fn geometry(scan: &Scan, extent: &Extent, rays: &[Ray]) -> Vec<(&'static str, Va
             "elevation_deg",
             of_rays(rays, |ray| json!(rounded(ray.elevation_rad.to_degrees()))),
         ),
-        ("gates_before", json!(extent.gates_before)),
+        ("gates_before", json!(gates_before)),
         (
             "range_m",
             map.range_m
