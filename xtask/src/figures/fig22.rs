@@ -80,6 +80,12 @@ struct Row {
     detected_m2_s: Measured,
 }
 
+impl Row {
+    fn method_name(&self) -> &'static str {
+        METHODS.get(self.method).copied().unwrap_or("detect")
+    }
+}
+
 /// A circulation that is not known.
 const UNKNOWN: Measured = Measured {
     value: f64::NAN,
@@ -302,9 +308,8 @@ impl Scans<'_> {
 
 /// A row for each vortex of each scan and method, and one for what is detected in each case.
 fn table(rows: &[Row]) -> Table {
-    let method = |row: &Row| METHODS.get(row.method).copied().unwrap_or("detect");
     Table::new()
-        .text("method", column(rows, method))
+        .text("method", column(rows, Row::method_name))
         .int("scan", column(rows, |row| row.scan as i64))
         .float(
             "dissipation_m2_s3",
