@@ -7,14 +7,6 @@ const RADII_M: [f64; 3] = [1.0, 2.0, 4.0];
 /// Where the chapter gives the levels.
 const CHAPTER_RANGE_M: f64 = 400.0;
 
-/// Level and effective samples of an estimate.
-struct Level {
-    radius_m: f64,
-    range_m: f64,
-    windows: usize,
-    n_eff: f64,
-}
-
 /// The middle line of a scan and how windows accumulate on it.
 struct Accumulation {
     geometry: ScanGeometry,
@@ -45,15 +37,10 @@ impl Accumulation {
         })
     }
 
-    fn level(&self, range_m: f64, radius_m: f64) -> Level {
+    /// Windows accumulated for an estimate, and independent windows that they are worth.
+    fn level(&self, range_m: f64, radius_m: f64) -> (usize, f64) {
         let point = PolarPoint::at_elevation(range_m, self.elevation_rad);
-        let (windows, n_eff) = self.geometry.level(point, radius_m, &self.correlation);
-        Level {
-            radius_m,
-            range_m,
-            windows,
-            n_eff,
-        }
+        self.geometry.level(point, radius_m, &self.correlation)
     }
 
     /// Every eighth gate, and the range of the chapter, in their order.
@@ -78,22 +65,28 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let accumulation = Accumulation::new(&plan)?;
     let ranges_m = accumulation.ranges_m();
     let styles = [Style::Dot, Style::DashDot, Style::Line];
-    let mut levels = Vec::new();
+    let mut rho_m = Vec::new();
+    let mut range_m = Vec::new();
+    let mut windows = Vec::new();
+    let mut n_eff = Vec::new();
     let mut series = Vec::new();
     for (radius_m, style) in RADII_M.into_iter().zip(styles) {
         let mut points = Vec::new();
-        for &range_m in &ranges_m {
-            let level = accumulation.level(range_m, radius_m);
-            points.push((range_m, level.windows as f64));
-            levels.push(level);
+        for &gate_m in &ranges_m {
+            let (level, independent) = accumulation.level(gate_m, radius_m);
+            points.push((gate_m, level as f64));
+            rho_m.push(radius_m);
+            range_m.push(gate_m);
+            windows.push(level);
+            n_eff.push(independent);
         }
         series.push(Series::new(&format!("ρ = {radius_m} m"), style, points));
     }
     let table = Table::new()
-        .float("rho_m", column(&levels, |l| l.radius_m))
-        .float("range_m", column(&levels, |l| l.range_m))
-        .int("level", column(&levels, |l| l.windows as i64))
-        .float("n_eff", column(&levels, |l| l.n_eff));
+        .float("rho_m", rho_m)
+        .float("range_m", range_m)
+        .int("level", column(&windows, |level| *level as i64))
+        .float("n_eff", n_eff);
     let x = Axis::linear("range [m]");
     let y = Axis::log("windows accumulated");
     let plot = CurvePlot {
@@ -103,17 +96,17 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let origin = plan.file.provenance();
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
     let at_chapter = RADII_M.map(|radius_m| accumulation.level(CHAPTER_RANGE_M, radius_m));
-    out.claims = vec![falling_claim(&levels), chapter_claim(&at_chapter)];
+    let of_radii: Vec<&[usize]> = windows.chunks(ranges_m.len()).collect();
+    out.claims = vec![falling_claim(&of_radii), chapter_claim(&at_chapter)];
     Ok(out)
 }
 
 /// Counts of grid points jump by a few; the means over quarters of the range do not.
-fn falling_claim(levels: &[Level]) -> Claim {
+fn falling_claim(of_radii: &[&[usize]]) -> Claim {
     let mut falls = true;
     let mut measured = Vec::new();
-    for radius_m in RADII_M {
-        let of_radius = levels.iter().filter(|level| level.radius_m == radius_m);
-        let windows: Vec<f64> = of_radius.map(|level| level.windows as f64).collect();
+    for (radius_m, levels) in RADII_M.into_iter().zip(of_radii) {
+        let windows: Vec<f64> = levels.iter().map(|level| *level as f64).collect();
         let mut means = Vec::new();
         for quarter in windows.chunks(windows.len().div_ceil(4)) {
             means.push(quarter.iter().sum::<f64>() / quarter.len() as f64);
@@ -127,13 +120,13 @@ fn falling_claim(levels: &[Level]) -> Claim {
 }
 
 /// The levels of the chapter at its range.
-fn chapter_claim(levels: &[Level; 3]) -> Claim {
+fn chapter_claim(levels: &[(usize, f64); 3]) -> Claim {
     let mut agrees = true;
-    for (level, chapter) in levels.iter().zip([20.0, 60.0, 120.0]) {
-        agrees &= (level.windows as f64 / chapter - 1.0).abs() < 0.1;
+    for ((windows, _), chapter) in levels.iter().zip([20.0, 60.0, 120.0]) {
+        agrees &= (*windows as f64 / chapter - 1.0).abs() < 0.1;
     }
-    let windows = levels.each_ref().map(|level| level.windows.to_string());
-    let n_eff = levels.each_ref().map(|level| format!("{:.1}", level.n_eff));
+    let windows = levels.map(|(windows, _)| windows.to_string());
+    let n_eff = levels.map(|(_, n_eff)| format!("{n_eff:.1}"));
     let measured = format!(
         "{} (as good as {} independent ones)",
         windows.join(", "),
