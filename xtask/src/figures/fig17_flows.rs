@@ -55,38 +55,40 @@ impl OfFlow {
         })
     }
 
-    /// The errors of a method.
-    fn errors(&self, method: &str) -> Errors {
+    /// The rows of a method.
+    fn of_method(&self, method: &str) -> Vec<&RetrievalRow> {
         let mut rows = Vec::new();
         for (name, row) in &self.rows {
             if *name == method {
                 rows.push(row);
             }
         }
-        let mut all = Vec::new();
-        let mut means = Vec::new();
+        rows
+    }
+
+    /// Errors of the vortices that a method found, by scans in which there are some.
+    fn errors_percent(&self, method: &str) -> Vec<Vec<f64>> {
+        let mut errors = Vec::new();
+        let rows = self.of_method(method);
         for scan in rows.chunk_by(|a, b| a.realisation == b.realisation) {
-            let errors: Vec<f64> = scan.iter().filter_map(|row| error_percent(row)).collect();
-            if !errors.is_empty() {
-                means.push(mean(&errors, None));
-            }
-            all.extend(errors);
+            errors.push(scan.iter().filter_map(|row| error_percent(row)).collect());
         }
-        Errors {
-            missing: rows.len() - all.len(),
-            bias: Estimate::mean(&means),
-            percent: all,
-        }
+        errors.retain(|scan: &Vec<f64>| !scan.is_empty());
+        errors
+    }
+
+    /// Vortices that a method did not find.
+    fn missing(&self, method: &str) -> usize {
+        let rows = self.of_method(method);
+        rows.iter()
+            .filter(|row| error_percent(row).is_none())
+            .count()
     }
 }
 
-/// Errors of the circulation over 5 to 15 m in per cent of the truth.
-struct Errors {
-    percent: Vec<f64>,
-    /// Vortices that were not found.
-    missing: usize,
-    /// Mean error, each scan a batch.
-    bias: Estimate,
+/// Mean error, each scan a batch.
+fn bias(errors_percent: &[Vec<f64>]) -> Estimate {
+    Estimate::mean(&column(errors_percent, |scan| mean(scan, None)))
 }
 
 /// Error of the circulation over 5 to 15 m in per cent of the truth; none of a vortex that was not found.
@@ -221,7 +223,7 @@ pub(super) fn picture(flows: &[OfFlow]) -> CurvePlot {
     for (k, name) in names().enumerate() {
         let mut points = Vec::new();
         for flow in flows {
-            let errors = flow.errors(name).percent;
+            let errors = flow.errors_percent(name).concat();
             if errors.is_empty() {
                 continue;
             }
@@ -242,21 +244,21 @@ pub(super) fn claims(flows: &[OfFlow]) -> Vec<Claim> {
 
 /// The bias of the method that is judged; all are reported.
 fn claim(flow: &OfFlow) -> Claim {
-    let judged = flow.errors(JUDGED);
+    let missing = flow.missing(JUDGED);
     let mut others = Vec::new();
     for name in names() {
-        let errors = flow.errors(name);
-        if name == JUDGED || errors.percent.is_empty() {
+        let errors = flow.errors_percent(name);
+        if name == JUDGED || errors.is_empty() {
             continue;
         }
         others.push(format!(
             "{name} {} %, scatter {:.1} %, {} failed",
-            errors.bias.words(),
-            Estimate::deviation(&errors.percent),
-            errors.missing
+            bias(&errors).words(),
+            Estimate::deviation(&errors.concat()),
+            flow.missing(name)
         ));
     }
-    let words = format!("{} failed; {}", judged.missing, others.join("; "));
-    Claim::judged_alone(flow.claim, judged.bias, " %", Bar::Between(-5.0, 5.0))
-        .of_fits(judged.missing, &words)
+    let words = format!("{missing} failed; {}", others.join("; "));
+    let bias = bias(&flow.errors_percent(JUDGED));
+    Claim::judged_alone(flow.claim, bias, " %", Bar::Between(-5.0, 5.0)).of_fits(missing, &words)
 }
