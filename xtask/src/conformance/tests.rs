@@ -90,7 +90,7 @@ impl Set {
             signals: Mutex::new(None),
             keeps_files: true,
         };
-        call(&words, host).map_err(|refusal| refusal.0)
+        call(&words, host)
     }
 
     fn table(&self, command: &str, files: &[&str], options: &str) -> Vec<Row> {
