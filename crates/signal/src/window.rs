@@ -20,6 +20,9 @@ const MAX_REACH: f64 = 1e7;
 /// before the amplitudes are computed anew for each sample.
 const ALIGNMENT_TOLERANCE: f64 = 1e-6;
 
+/// Most samples whose amplitudes are stored for layers thicker than a sample.
+const MOST_SAMPLES_PER_LAYER: f64 = 16.0;
+
 /// Number of layers summed on this side of the nearest one and beyond it. For a Gaussian both are
 /// `L_c = ceil(3.72 sigma c/(2 DeltaR))` (corrected: the chapter's form is dimensionally wrong);
 /// one may be negative if the envelope lies on one side of time 0.
@@ -38,6 +41,20 @@ pub(crate) fn reach(pulse: &Pulse, layer_thickness_m: f64) -> Result<(i64, i64),
     Ok((near as i64, far as i64))
 }
 
+/// Samples after which a whole number of layers has passed, and that number: several layers a sample
+/// or several samples a layer; `None` if no such number holds over the whole record.
+fn period(layers_per_sample: f64, samples: usize) -> Option<(usize, i64)> {
+    let tolerance = ALIGNMENT_TOLERANCE / samples as f64;
+    let layers = layers_per_sample.round();
+    if (layers_per_sample - layers).abs() <= tolerance {
+        return Some((1, layers as i64));
+    }
+    let samples_per_layer = layers_per_sample.recip().round();
+    let is_whole = (layers_per_sample - samples_per_layer.recip()).abs() <= tolerance;
+    (is_whole && samples_per_layer <= MOST_SAMPLES_PER_LAYER)
+        .then_some((samples_per_layer as usize, 1))
+}
+
 /// Number of layers from the nearest to the farthest of [`reach`].
 pub(crate) fn lit_layers(near: i64, far: i64) -> usize {
     (near + far + 1).max(1) as usize
@@ -54,10 +71,15 @@ pub(crate) struct Window {
     start: f64,
     /// Layers per sampling interval.
     step: f64,
-    /// Whole number of layers per sample, if it is one over the whole record.
-    aligned_step: Option<i64>,
+    /// Samples after which a whole number of layers has passed, and that number, if they are so over
+    /// the whole record.
+    period: Option<(usize, i64)>,
+    /// Layers nearest to the samples of the first period.
+    nearest: Vec<i64>,
+    /// Layers of [`lit_layers`].
+    lit: usize,
     /// Real parts of the amplitudes of the layers from `-near` to `far` about the nearest one, and
-    /// imaginary parts unless the envelope is real.
+    /// imaginary parts unless the envelope is real; for each sample of a period.
     re: Vec<f64>,
     im: Vec<f64>,
     /// Factors `exp(j phase)` on them, the phase of the laser while it sent the pulse; empty
@@ -102,16 +124,22 @@ impl Window {
             - line.first_range_m)
             / thickness_m;
         self.step = 0.5 * SPEED_OF_LIGHT_M_S * (1.0 / sample_rate_hz) / thickness_m;
-        let whole = self.step.round();
-        let aligned = (self.step - whole).abs() * record.samples as f64 <= ALIGNMENT_TOLERANCE;
-        self.aligned_step = aligned.then_some(whole as i64);
+        self.period = period(self.step, record.samples);
         turns.clone_into(&mut self.turns);
-        let count = lit_layers(self.near, self.far);
+        self.lit = lit_layers(self.near, self.far);
+        let samples = self.period.map_or(1, |(samples, _)| samples);
         let real = pulse.is_real() && turns.is_empty();
-        self.re.resize(count, 0.0);
-        self.im.resize(if real { 0 } else { count }, 0.0);
-        if aligned {
-            self.fill_amplitudes(pulse, thickness_m, self.start - self.start.round());
+        self.re.resize(samples * self.lit, 0.0);
+        self.im
+            .resize(if real { 0 } else { samples * self.lit }, 0.0);
+        self.nearest.clear();
+        if self.period.is_some() {
+            for sample in 0..samples {
+                let position = self.start + sample as f64 * self.step;
+                let nearest = position.round();
+                self.nearest.push(nearest as i64);
+                self.fill_amplitudes(pulse, thickness_m, sample, position - nearest);
+            }
         }
         Ok(())
     }
@@ -124,19 +152,21 @@ impl Window {
         self.turns.get(index).copied().unwrap_or(Complex::ONE)
     }
 
-    /// Amplitudes for a sample whose range lies `offset` layers beyond the centre of
+    /// Amplitudes for a sample of a period whose range lies `offset` layers beyond the centre of
     /// the nearest layer.
-    fn fill_amplitudes(&mut self, pulse: &Pulse, thickness_m: f64, offset: f64) {
+    fn fill_amplitudes(&mut self, pulse: &Pulse, thickness_m: f64, sample: usize, offset: f64) {
         let layer_s = 2.0 * thickness_m / SPEED_OF_LIGHT_M_S;
         let near = self.near as f64;
+        let here = sample * self.lit..(sample + 1) * self.lit;
         if self.im.is_empty() {
-            for (j, re) in self.re.iter_mut().enumerate() {
+            for (j, re) in self.re[here].iter_mut().enumerate() {
                 let time_s = (offset + near - j as f64) * layer_s;
                 *re = pulse.envelope_per_sqrt_s(time_s).re;
             }
             return;
         }
-        for (j, (re, im)) in self.re.iter_mut().zip(&mut self.im).enumerate() {
+        let parts = self.re[here.clone()].iter_mut().zip(&mut self.im[here]);
+        for (j, (re, im)) in parts.enumerate() {
             let time_s = (offset + near - j as f64) * layer_s;
             let turn = self.turns.get(j).copied().unwrap_or(Complex::ONE);
             let amplitude = pulse.envelope_per_sqrt_s(time_s) * turn;
@@ -147,12 +177,11 @@ impl Window {
 
     /// Index of the layer nearest to the range of sample `k`, which may lie outside the line.
     fn centre(&self, k: usize) -> i64 {
-        match self.aligned_step {
-            Some(step) => {
-                (self.start.round() as i64).saturating_add((k as i64).saturating_mul(step))
-            }
-            None => (self.start + k as f64 * self.step).round() as i64,
-        }
+        let Some((samples, layers)) = self.period else {
+            return (self.start + k as f64 * self.step).round() as i64;
+        };
+        let passed = ((k / samples) as i64).saturating_mul(layers);
+        self.nearest[k % samples].saturating_add(passed)
     }
 
     /// Layers lit at sample `k` as `(first, one past the last)`, both within the line.
@@ -166,9 +195,9 @@ impl Window {
 
     /// Amplitudes of the layers of [`Window::layers_at`].
     pub(crate) fn amplitudes_at(&mut self, pulse: &Pulse, thickness_m: f64, k: usize) -> Lit<'_> {
-        if self.aligned_step.is_none() {
+        if self.period.is_none() {
             let position = self.start + k as f64 * self.step;
-            self.fill_amplitudes(pulse, thickness_m, position - position.round());
+            self.fill_amplitudes(pulse, thickness_m, 0, position - position.round());
         }
         let (first, end) = self.layers_at(k);
         if first == end {
@@ -178,7 +207,8 @@ impl Window {
                 im: &[],
             };
         }
-        let shift = (first as i64 - (self.centre(k) - self.near)) as usize;
+        let sample = self.period.map_or(0, |(samples, _)| k % samples);
+        let shift = sample * self.lit + (first as i64 - (self.centre(k) - self.near)) as usize;
         let lit = shift..shift + (end - first);
         Lit {
             first,

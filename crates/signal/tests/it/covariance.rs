@@ -75,6 +75,34 @@ fn a_chirped_pulse_in_a_linear_gradient_has_the_closed_form() {
 }
 
 #[test]
+fn layers_in_a_gradient_miss_the_closed_form_fraction_of_the_power() {
+    // Layers D apart repeat the phase of a gradient g at the lag lambda/(2 g D), where the pulse still overlaps itself.
+    let gradient_per_s = 1.0;
+    let pulse = gaussian(200e-9);
+    let sigma_s = pulse.sigma_s();
+    let simulator = simulator(pulse, NoiseModel::None, FIRST_M, 256);
+    let velocity = |r: f64| 3.0 + gradient_per_s * (r - FIRST_M);
+    let covariance = |thickness_m: f64| {
+        let air = line(250.0, 800.0, thickness_m, velocity);
+        simulator.covariance_a2(&air).unwrap()
+    };
+    let exact = covariance(0.1);
+    for times_thinner in [1.0, 1.5, 2.0] {
+        let thickness_m = WAVELENGTH_M / (4.0 * sigma_s * gradient_per_s * times_thinner);
+        let found = largest_difference(
+            &covariance(thickness_m),
+            &exact,
+            power_a2(&Pulse::from(pulse)),
+        );
+        let expected = (-times_thinner * times_thinner).exp();
+        assert!(
+            (found / expected - 1.0).abs() < 0.05,
+            "{thickness_m} m: {found} for {expected}"
+        );
+    }
+}
+
+#[test]
 fn expected_covariance_is_that_of_the_simulators_own_responses() {
     for pulse in [
         gaussian(200e-9).into(),

@@ -10,10 +10,15 @@ use crate::plan::wind::SceneWind;
 use crate::scene::{Scene, SceneFile};
 use wakescope_signal::{LayerLimits, Pulse};
 
-/// Layers of scenes with a transported pair are this many times as thick as the rule of
-/// [`Pulse::layer_thickness_m`] has them. The covariance of a record is a sum over layers that converges exponentially: with cores
-/// of 1.3 m it is then within 2 % of the power, and the mean of a spectrum within 0.001 m/s (`measure/scan/layers.rs`).
-const TRANSPORTED_THICKNESS: f64 = 4.0;
+/// Layers of scenes with a transported pair are this many times as thick as the rule of [`Pulse::layer_thickness_m`] has them, that is
+/// `D = lambda/(8 sigma g)`. In a gradient `g` all along a pulse a sum over layers misses `exp(-(lambda/(4 sigma g D))^2)` of the power
+/// in the covariance of a record, 2 % (`measure/scan/layers.rs`); in a core, which is smaller than the pulse, less.
+const TRANSPORTED_THICKNESS: f64 = 2.0;
+/// Numbers of samples that layers may hold where winds change little along a line.
+const SAMPLES_PER_LAYER: [f64; 2] = [4.0, 2.0];
+/// Layers of several samples are at most this fraction of the shortest wavelength of eddies: their variance in a pulse is then kept,
+/// and their mean over it is negligible.
+const EDDY_FRACTION: f64 = 0.6;
 
 /// The sampling of one scan in angle, range and time.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,7 +74,7 @@ impl Geometry {
         let limits = layer_limits(scene, max_gradient_per_s);
         let layer_thickness_m = pulse.layer_thickness_m(limits)?;
         let signal_layer_thickness_m = match scene.has_layers_of_each_line() {
-            true => pulse.layer_thickness_m(layer_limits(scene, 0.0))?,
+            true => signal_layer_thickness_m(scene, pulse, 0.0)?,
             false => layer_thickness_m,
         };
         // Layers before and behind the range of a sample that the pulse lights.
@@ -117,4 +122,32 @@ pub(crate) fn layer_limits(scene: &Scene, max_gradient_per_s: f64) -> LayerLimit
         wavelength_m: scene.laser.wavelength_m,
         max_gradient_per_s: max_gradient_per_s / thicker,
     }
+}
+
+/// Thickness of the layers of the signals of a line with this steepest wind, 1/s: a few samples where that wind and the smallest eddies
+/// allow it.
+///
+/// # Errors
+/// As [`Pulse::layer_thickness_m`].
+pub(crate) fn signal_layer_thickness_m(
+    scene: &Scene,
+    pulse: &Pulse,
+    steepest_per_s: f64,
+) -> Result<f64, Error> {
+    let limits = layer_limits(scene, steepest_per_s);
+    let most_m = match scene.eddies() {
+        Some(eddies) => EDDY_FRACTION * eddies.smallest_m,
+        None => f64::INFINITY,
+    };
+    for samples in SAMPLES_PER_LAYER {
+        let thickness_m = pulse.layer_thickness_m(LayerLimits {
+            sample_rate_hz: limits.sample_rate_hz / samples,
+            ..limits
+        })?;
+        let is_whole = thickness_m > 0.999 * samples * scene.sample_spacing_m();
+        if is_whole && thickness_m <= most_m {
+            return Ok(thickness_m);
+        }
+    }
+    Ok(pulse.layer_thickness_m(limits)?)
 }

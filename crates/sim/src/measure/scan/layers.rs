@@ -1,14 +1,14 @@
 //! Layers of the signals of a line: as thick as its own steepest wind allows.
 //!
 //! The layers of a scan are as thin as its steepest wind needs, which only lines near a vortex core meet. Signals of the other lines
-//! have fewer layers of the same air: every k-th, so that layers still divide the distance of samples. Only scenes with a
-//! transported pair have them: signals of others keep their stored values.
+//! have fewer layers of the same air: every k-th, so that layers still divide the distance of samples or hold a few of them. Only
+//! scenes with a transported pair have them: signals of others keep their stored values.
 //!
 //! Check: thick layers have the air of the thin ones; errors of a map with thick layers are those with thin ones.
 
 use crate::Error;
 use crate::plan::Plan;
-use crate::plan::geometry::{Geometry, layer_limits};
+use crate::plan::geometry::{Geometry, signal_layer_thickness_m};
 use wakescope_signal::LineOfSight;
 
 /// The line of sight that the signals of each line have; `None` where it is that of the scan.
@@ -32,12 +32,15 @@ fn thick_line(plan: &Plan, line: &LineOfSight) -> Result<Option<LineOfSight>, Er
     if steepest_per_s.is_nan() {
         return Ok(None);
     }
-    let limits = layer_limits(plan.scene(), steepest_per_s);
-    let allowed_m = plan.instrument.pulse.layer_thickness_m(limits)?;
+    let allowed_m = signal_layer_thickness_m(plan.scene(), &plan.instrument.pulse, steepest_per_s)?;
     let parts = (g.sample_spacing_m / g.layer_thickness_m).round() as usize;
+    let samples = (allowed_m / g.sample_spacing_m + 1e-6) as usize;
+    if samples > 0 {
+        return Ok((samples * parts > 1).then(|| every(line, g, samples * parts)));
+    }
     let least = (g.sample_spacing_m / allowed_m).round() as usize;
     let divides = |fewer: &usize| parts.is_multiple_of(*fewer);
-    let fewer = (least.max(1)..parts).find(divides);
+    let fewer = (least..parts).find(divides);
     Ok(fewer.map(|fewer| every(line, g, parts / fewer)))
 }
 
@@ -172,12 +175,16 @@ mod tests {
         let samples = plan.scene().estimator.window_samples;
         let mut worst: f64 = 0.0;
         let mut steep = 0;
+        let mut of_samples = 0;
         for (index, line) in scanner.air.lines.iter().enumerate() {
-            if steepest_per_s(line) < 1.0 {
+            let is_steep = steepest_per_s(line) >= 1.0;
+            if !is_steep && index % 8 > 0 {
                 continue;
             }
-            steep += 1;
+            steep += usize::from(is_steep);
             let of_signals = scanner.air.of_signals(index);
+            let samples_per_layer = of_signals.layer_thickness_m / plan.geometry.sample_spacing_m;
+            of_samples += usize::from(samples_per_layer > 3.9);
             let middle_m = 0.5 * samples as f64 * plan.geometry.sample_spacing_m;
             let record = Record {
                 time_of_first_sample_s: 2.0 * (steepest_at_m(line) - middle_m)
@@ -195,7 +202,7 @@ mod tests {
                 worst = worst.max((thick_a2 - thin_a2).norm() / power_a2);
             }
         }
-        assert!(steep > 5, "{steep}");
+        assert!(steep > 5 && of_samples > 5, "{steep} {of_samples}");
         assert!(worst < 0.02, "{worst}");
     }
 
