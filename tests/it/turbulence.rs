@@ -12,7 +12,7 @@ use wakescope_estimate::retrieval::{
 use wakescope_estimate::turbulence::VonKarman;
 use wakescope_estimate::vortex_fit::{CorePrior, Wake};
 use wakescope_estimate::wake_detection::DetectorOptions;
-use wakescope_les::winds::{Eddies, ModeBand, SampledLine, Wind, isotropic_modes};
+use wakescope_les::winds::{Eddies, SampledLine, Wind, isotropic_modes};
 use wakescope_sim::detection::{DetectionSettings, detect};
 use wakescope_sim::progress::Silent;
 
@@ -51,13 +51,11 @@ impl Air {
             outer_scale_m: self.outer_scale_m,
             kolmogorov_constant: 1.5,
         };
-        let band = ModeBand {
-            wavenumber_rad_m: [0.1 / self.outer_scale_m, std::f64::consts::TAU / SMALLEST_M],
-            modes: MODES,
-            lattice_start: [uniform(rng), uniform(rng)],
-        };
+        let band_rad_m = [0.1 / self.outer_scale_m, std::f64::consts::TAU / SMALLEST_M];
+        let lattice_start = [uniform(rng), uniform(rng)];
         let energy = |k: f64| spectrum.energy_m3_s2(k);
-        let modes = isotropic_modes(&band, energy, |_| [0; 3].map(|_| uniform(rng))).unwrap();
+        let uniforms = |_| [0; 3].map(|_| uniform(rng));
+        let modes = isotropic_modes(band_rad_m, MODES, lattice_start, energy, uniforms).unwrap();
         Eddies::new(modes).unwrap()
     }
 }

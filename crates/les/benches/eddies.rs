@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use wakescope_les::winds::{Eddies, LineEvaluation, ModeBand, SampledLine, isotropic_modes};
+use wakescope_les::winds::{Eddies, SampledLine, isotropic_modes};
 use wakescope_les::{Error, Wind};
 
 const SAMPLES: usize = 1000;
@@ -11,17 +11,19 @@ const SAMPLES: usize = 1000;
 /// A field with the default keys of a scene.
 fn field() -> Result<Eddies, Error> {
     let outer_scale_m = 100.0;
-    let band = ModeBand {
-        wavenumber_rad_m: [0.1 / outer_scale_m, std::f64::consts::TAU / 2.0],
-        modes: 512,
-        lattice_start: [0.3, 0.6],
-    };
+    let band_rad_m = [0.1 / outer_scale_m, std::f64::consts::TAU / 2.0];
     let energy = |k: f64| {
         let x2 = (k * outer_scale_m).powi(2);
         x2 * x2 / (1.0 + x2).powf(17.0 / 6.0)
     };
     let uniforms = |n: usize| [0.1, 0.2, 0.3].map(|start| (start + 0.618 * n as f64).fract());
-    Eddies::new(isotropic_modes(&band, energy, uniforms)?)
+    Eddies::new(isotropic_modes(
+        band_rad_m,
+        512,
+        [0.3, 0.6],
+        energy,
+        uniforms,
+    )?)
 }
 
 fn bench_line(c: &mut Criterion, name: &str, field: &Eddies, samples: usize) {
@@ -46,7 +48,7 @@ fn benches(c: &mut Criterion) {
     let Ok(field) = field() else {
         return;
     };
-    let all = field.clone().with_evaluation(LineEvaluation::All);
+    let all = field.clone().summed_at_each_sample();
     bench_line(c, "levels", &field, SAMPLES);
     bench_line(c, "levels", &field, 400);
     bench_line(c, "all", &all, SAMPLES);

@@ -13,31 +13,6 @@ pub struct Place {
     pub position_m: [f64; 3],
 }
 
-/// A kinetic energy that nothing can have given.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error(
-    "step {step} (t = {time_s:?} s): the kinetic energy has grown to {energy_m5_s2:.6e} m^5/s^2, at most \
-     {allowed_m5_s2:.6e} can have come from the start, a force or walls that move; it grows at {rate_per_s:.3e} 1/s, \
-     most in {} near cell {:?}, x, y, z = {:?} m: {cause}",
-    place.component, place.cell, place.position_m
-)]
-pub struct EnergyGrowth {
-    /// Number of the step.
-    pub step: u64,
-    /// Time reached \[s\].
-    pub time_s: f64,
-    /// Kinetic energy, integral of `u^2/2` \[m^5/s^2\].
-    pub energy_m5_s2: f64,
-    /// The most that the flow may have.
-    pub allowed_m5_s2: f64,
-    /// Growth rate of the energy in this step \[1/s\].
-    pub rate_per_s: f64,
-    /// Where the shortest waves are strongest.
-    pub place: Place,
-    /// The likeliest cause, and what to do.
-    pub cause: String,
-}
-
 /// Why a wind could not be built or sampled, or a flow not simulated. Every variant carries the
 /// values and what is allowed.
 #[non_exhaustive]
@@ -112,8 +87,28 @@ pub enum Error {
     },
     /// A flow has more kinetic energy than it started with and force or moving walls can have given
     /// it.
-    #[error("{0}")]
-    EnergyGrew(Box<EnergyGrowth>),
+    #[error(
+        "step {step} (t = {time_s:?} s): the kinetic energy has grown to {energy_m5_s2:.6e} m^5/s^2, at most \
+         {allowed_m5_s2:.6e} can have come from the start, a force or walls that move; it grows at {rate_per_s:.3e} 1/s, \
+         most in {} near cell {:?}, x, y, z = {:?} m: {cause}",
+        place.component, place.cell, place.position_m
+    )]
+    EnergyGrew {
+        /// Number of the step.
+        step: u64,
+        /// Time reached \[s\].
+        time_s: f64,
+        /// Kinetic energy, integral of `u^2/2` \[m^5/s^2\].
+        energy_m5_s2: f64,
+        /// The most that the flow may have.
+        allowed_m5_s2: f64,
+        /// Growth rate of the energy in this step \[1/s\].
+        rate_per_s: f64,
+        /// Where the shortest waves are strongest.
+        place: Box<Place>,
+        /// The likeliest cause, and what to do.
+        cause: String,
+    },
     /// The time step feeds a flow with more energy than viscosity and subgrid model take.
     #[error("step {step} (t = {time_s:?} s): {cause}")]
     StepFeeds {

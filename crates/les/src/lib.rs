@@ -56,7 +56,7 @@ pub mod ranks;
 pub mod solver;
 pub mod winds;
 
-pub use error::{EnergyGrowth, Error, Place, PressureFailure};
+pub use error::{Error, Place, PressureFailure};
 #[cfg(feature = "solver")]
 pub use solver::{
     Direction, Flow, FlowSettings, Mapping, Mesh, Spread, SubgridModel, TimeScheme, TimeStep, Wall,

@@ -153,8 +153,10 @@ impl Sight {
             flow: Flow::VortexPair(pair),
             ..Scene::default()
         };
-        let c = wind::vortex_pair(&pair).centres(wind::start_s(&scene.flow));
-        let cores = vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)];
+        let vortices = wind::vortex_pair(&pair).vortices(wind::start_s(&scene.flow));
+        let cores = vortices
+            .map(|vortex| (vortex.lateral_position_m, vortex.height_m))
+            .to_vec();
         Self {
             flow: scene.flow,
             folder: PathBuf::new(),

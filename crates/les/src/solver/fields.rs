@@ -15,7 +15,6 @@ use super::flow::Flow;
 use super::layout::Shape;
 use super::mesh::{Ends, Mesh};
 use super::planes::without_halos;
-use super::report::StartReport;
 use super::settings::FlowSettings;
 use super::transport::MEAN;
 use crate::error::{Error, check_lengths};
@@ -168,10 +167,7 @@ impl Flow {
     ///
     /// # Errors
     /// As [`Flow::new`], and for arrays of the wrong length.
-    pub(super) fn with_faces(
-        self,
-        velocity_m_s: &[Vec<f64>; 3],
-    ) -> Result<(Self, StartReport), Error> {
+    pub(super) fn with_faces(self, velocity_m_s: &[Vec<f64>; 3]) -> Result<(Self, f64), Error> {
         let [nx, ny, nz] = self.mesh.cells();
         let direction = self.layout.direction;
         for values in velocity_m_s {

@@ -10,19 +10,19 @@
 //! Check: energy and momentum without viscosity, orders in space and time, exact solutions, bits
 //! against threads and restart.
 
-use momentum_rhs::{PredictedField, Prediction};
+use momentum_rhs::Prediction;
 use rayon::prelude::*;
 
 mod momentum_rhs;
 mod project;
 
 use super::component_operators::ComponentOperators;
-use super::implicit::LineSolvers;
+use super::implicit::{LineSolver, solvers_for_stage};
 use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
 use super::pressure::{PressureSolver, Solved, accept_round_off};
 use super::projection::{Divergence, correct, weighted_dot};
-use super::report::{Powers, StartReport, StepReport};
+use super::report::{Powers, StepReport};
 use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
 use super::stiffness::{implicit_axes, viscous_rates_per_s};
 use super::subgrid::Subgrid;
@@ -39,7 +39,8 @@ pub struct Flow {
     pub(super) divergence: Divergence,
     pressure_solver: PressureSolver,
     pub(super) model: Option<Subgrid>,
-    line_solvers: LineSolvers,
+    /// Viscosity times the implicit part of the last stages \[m^2\], with the factors for it.
+    line_solvers: Vec<(f64, Vec<LineSolver>)>,
     /// Largest decay rate of the viscous term along each memory axis \[1/s\].
     pub(super) viscous_per_s: [f64; 3],
     pub(super) predicted: [Aligned; 3],
@@ -67,7 +68,8 @@ pub(crate) struct State {
 impl Flow {
     /// A simulation on `mesh` that starts from `initial(position_m) -> velocity_m_s`. The field is
     /// evaluated at the faces, projected onto divergence-free fields, and the pressure that belongs
-    /// to it is computed.
+    /// to it is computed. Also returns the kinetic energy of the initial field before its projection
+    /// \[m^5/s^2\].
     ///
     /// # Errors
     /// Settings out of range, a mesh that the pressure solver cannot take, an initial field that is
@@ -76,7 +78,7 @@ impl Flow {
         mesh: Mesh,
         settings: FlowSettings,
         initial: impl Fn([f64; 3]) -> [f64; 3] + Sync,
-    ) -> Result<(Self, StartReport), Error> {
+    ) -> Result<(Self, f64), Error> {
         Self::at_rest(mesh, settings)?.with_field(initial)
     }
 
@@ -84,7 +86,7 @@ impl Flow {
     pub(super) fn with_field(
         self,
         initial: impl Fn([f64; 3]) -> [f64; 3] + Sync,
-    ) -> Result<(Self, StartReport), Error> {
+    ) -> Result<(Self, f64), Error> {
         let direction = self.layout.direction;
         let at_m = [0, 1, 2].map(|axis| self.face_position_m(axis));
         self.with_face_velocity(|axis, index| initial(at_m[axis](index))[direction[axis]])
@@ -95,7 +97,7 @@ impl Flow {
     pub(super) fn with_face_velocity(
         mut self,
         velocity_m_s: impl Fn(usize, [usize; 3]) -> f64 + Sync,
-    ) -> Result<(Self, StartReport), Error> {
+    ) -> Result<(Self, f64), Error> {
         let shape = self.layout.shape;
         for axis in 0..3 {
             let first = self.layout.line[axis].first_face();
@@ -113,8 +115,8 @@ impl Flow {
                     }
                 });
         }
-        let report = self.start()?;
-        Ok((self, report))
+        let given_m5_s2 = self.start()?;
+        Ok((self, given_m5_s2))
     }
 
     /// Where a component lies at the indices along the memory axes, x, y, z \[m\].
@@ -169,7 +171,7 @@ impl Flow {
             divergence: Divergence::new(&layout),
             pressure_solver: PressureSolver::new(&layout, settings.pressure),
             model: Subgrid::new(&layout, settings.subgrid)?,
-            line_solvers: LineSolvers::default(),
+            line_solvers: Vec::new(),
             viscous_per_s: layout.direction.map(|d| viscous_per_s[d]),
             predicted: zero_fields(n),
             phi: Aligned::zeros(n),
@@ -181,8 +183,9 @@ impl Flow {
     }
 
     /// Projects the initial field, decides which directions are implicit, finds the pressure that
-    /// keeps the field's acceleration free of divergence.
-    pub(crate) fn start(&mut self) -> Result<StartReport, Error> {
+    /// keeps the field's acceleration free of divergence. Returns the kinetic energy before the
+    /// projection \[m^5/s^2\].
+    pub(crate) fn start(&mut self) -> Result<f64, Error> {
         if let (true, axis, place) = self.first_not_finite()? {
             return Err(self.diverged(axis, place, "initial velocity"));
         }
@@ -202,7 +205,7 @@ impl Flow {
                 old: 0.0,
             },
             stage_s: 1.0,
-            field: PredictedField::Increment,
+            is_increment: true,
             measures_powers: false,
         })?;
         for terms in &mut self.state.previous_terms {
@@ -213,10 +216,7 @@ impl Flow {
         let solved = self.pressure_solver.solve(&mut self.phi, tolerance);
         accept_round_off(solved)?;
         self.state.pressure.copy_from_slice(&self.phi);
-        Ok(StartReport {
-            given_energy_m5_s2: given,
-            kinetic_energy_m5_s2: self.state.energy,
-        })
+        Ok(given)
     }
 
     /// Makes one time step of the length that the settings give.
@@ -304,11 +304,7 @@ impl Flow {
     fn advance(&mut self, step_s: f64) -> Result<(Powers, Option<Solved>), Error> {
         let has_history = self.state.last_step_s > 0.0;
         let ratio = has_history.then(|| step_s / self.state.last_step_s);
-        let field = if self.state.implicit == [false; 3] {
-            PredictedField::Velocity
-        } else {
-            PredictedField::Increment
-        };
+        let is_increment = self.state.implicit != [false; 3];
         // The first step of Adams-Bashforth is one of Runge-Kutta, after which the history is the
         // terms of the initial field.
         let takes_first_terms = self.settings.scheme == TimeScheme::AdamsBashforth2 && !has_history;
@@ -322,7 +318,7 @@ impl Flow {
             let stage_powers = self.predict(Prediction {
                 stage,
                 stage_s,
-                field,
+                is_increment,
                 measures_powers: is_first,
             })?;
             if is_first {
@@ -355,7 +351,7 @@ impl Flow {
         }
         let a_m2 = 0.5 * nu_s_m2;
         let own = layout.shape.own_range();
-        for solver in self.line_solvers.for_stage(ops, state.implicit, a_m2) {
+        for solver in solvers_for_stage(&mut self.line_solvers, ops, state.implicit, a_m2) {
             let predicted = &mut predicted[solver.component];
             solver.solve(&layout.slabs, &mut predicted[own.clone()])?;
         }

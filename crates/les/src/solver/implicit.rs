@@ -30,37 +30,28 @@ pub(crate) struct LineSolver {
     upper: Vec<Taps>,
 }
 
-/// The factors for the last lengths of a stage.
-#[derive(Debug, Default)]
-pub(crate) struct LineSolvers(Vec<(f64, Vec<LineSolver>)>);
-
-impl LineSolvers {
-    /// The factors of all components along the implicit axes, `a_m2` being viscosity times the
-    /// implicit part of a stage \[m^2\].
-    pub(crate) fn for_stage(
-        &mut self,
-        ops: &[ComponentOperators; 3],
-        implicit: [bool; 3],
-        a_m2: f64,
-    ) -> &[LineSolver] {
-        let found = self
-            .0
-            .iter()
-            .position(|(a, _)| *a == a_m2)
-            .unwrap_or_else(|| {
-                // A fixed step has at most three stages of different length; a variable one always
-                // needs new factors.
-                self.0.truncate(2);
-                let axes = (0..3).filter(|&axis| implicit[axis]);
-                let solvers = ops.iter().flat_map(|ops| {
-                    axes.clone()
-                        .map(move |axis| LineSolver::new(ops, axis, a_m2))
-                });
-                self.0.insert(0, (a_m2, solvers.collect()));
-                0
-            });
-        &self.0[found].1
-    }
+/// The factors of all components along the implicit axes, `a_m2` being viscosity times the
+/// implicit part of a stage \[m^2\]: from `made`, those of the last stages, or new ones.
+pub(crate) fn solvers_for_stage<'a>(
+    made: &'a mut Vec<(f64, Vec<LineSolver>)>,
+    ops: &[ComponentOperators; 3],
+    implicit: [bool; 3],
+    a_m2: f64,
+) -> &'a [LineSolver] {
+    let found = made.iter().position(|(a, _)| *a == a_m2);
+    let index = found.unwrap_or_else(|| {
+        // A fixed step has at most three stages of different length; a variable one always needs
+        // new factors.
+        made.truncate(2);
+        let axes = (0..3).filter(|&axis| implicit[axis]);
+        let solvers = ops.iter().flat_map(|ops| {
+            axes.clone()
+                .map(move |axis| LineSolver::new(ops, axis, a_m2))
+        });
+        made.insert(0, (a_m2, solvers.collect()));
+        0
+    });
+    &made[index].1
 }
 
 /// Lines of axis 0 that are solved side by side.

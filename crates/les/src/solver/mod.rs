@@ -40,10 +40,10 @@ pub use flow::Flow;
 pub use growth::{Stability, UndampedGrowth};
 pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Spread, Wall};
 pub use pressure::PressureMethod;
-pub use report::{StartReport, StepReport};
+pub use report::StepReport;
 pub use run::{
     CheckpointPlan, EnergyBudget, Interval, NOTICED_GROWTH, Run, RunObserver, RunPlan, RunWarning,
-    Silent, StepEnergy, StepRecord,
+    StepEnergy, StepRecord,
 };
 pub use settings::{FlowSettings, TimeScheme, TimeStep};
 pub use subgrid::SubgridModel;

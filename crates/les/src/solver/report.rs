@@ -36,12 +36,3 @@ pub struct StepReport {
     /// Mean reduction of the residual per iteration.
     pub pressure_factor: Option<f64>,
 }
-
-/// What the projection of the initial field changed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StartReport {
-    /// Kinetic energy of the field given \[m^5/s^2\].
-    pub given_energy_m5_s2: f64,
-    /// Kinetic energy after the projection \[m^5/s^2\].
-    pub kinetic_energy_m5_s2: f64,
-}

@@ -172,7 +172,7 @@ impl FlowSettings {
     /// viscosity, [`Error::TooManyRanks`].
     pub fn validate(&self, mesh: &Mesh) -> Result<(), Error> {
         self.check()?;
-        subgrid::formula_and_order(self.subgrid)?;
+        subgrid::filter_order(self.subgrid)?;
         Layout::new(mesh).shared(self.ranks.clone())?;
         refuse_sticking_without_viscosity(mesh, self.viscosity_m2_s)
     }

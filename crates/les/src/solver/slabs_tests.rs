@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use super::cases::{Case, VortexPairCase, channel, taylor_green_3d};
 use super::pressure::PressureMethod;
-use super::report::{StartReport, StepReport};
+use super::report::StepReport;
 use super::settings::{FlowSettings, TimeScheme, TimeStep};
 use super::subgrid::SubgridModel;
 use crate::Error;
 use crate::ranks::{Ranks, Single, on_threads};
 
-/// All that a flow shows after some steps.
-type Seen = (StartReport, Vec<StepReport>, Vec<Vec<u64>>, f64);
+/// The energy given at the start, and all that a flow shows after some steps.
+type Seen = (f64, Vec<StepReport>, Vec<Vec<u64>>, f64);
 
 fn bits(values: Vec<f64>) -> Vec<u64> {
     values.into_iter().map(f64::to_bits).collect()

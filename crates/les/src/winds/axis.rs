@@ -134,15 +134,16 @@ impl Axis {
     }
 
     fn bounded(name: &'static str, node_m: &[f64], low: Side, high: Side) -> Result<Self, Error> {
-        let low_end = AxisEnd::new(name, node_m, low, false)?;
-        let high_end = AxisEnd::new(name, node_m, high, true)?;
+        let (low_ghosts, low_m) = bounded_end(name, node_m, low, false)?;
+        let (high_ghosts, high_m) = bounded_end(name, node_m, high, true)?;
+        let [below_m, above_m] = [low_ghosts, high_ghosts].map(|ghosts| ghosts.map(|(_, m)| m));
         Ok(Self {
             name,
-            position_m: padded_positions_m(low_end.ghost_m, node_m, high_end.ghost_m),
-            span_m: Some((low_end.edge_m, high_end.edge_m)),
+            position_m: padded_positions_m(below_m, node_m, above_m),
+            span_m: Some((low_m, high_m)),
             period_m: None,
             last_cell: node_m.len() + usize::from(high != Side::Open),
-            ghosts: [low_end.ghosts, high_end.ghosts],
+            ghosts: [low_ghosts, high_ghosts].map(|ghosts| ghosts.map(|(ghost, _)| ghost)),
         })
     }
 
@@ -291,57 +292,49 @@ pub(crate) fn refused(
     }
 }
 
-/// One bounded end of a direction.
-struct AxisEnd {
-    /// Sources of the ghosts, nearest first.
-    ghosts: [Ghost; GHOSTS],
-    /// Positions of the ghosts, nearest first \[m\].
-    ghost_m: [f64; GHOSTS],
-    /// Position at which the mesh ends: the wall, or the last node \[m\].
-    edge_m: f64,
-}
-
-impl AxisEnd {
-    fn new(axis: &'static str, node_m: &[f64], side: Side, is_high: bool) -> Result<Self, Error> {
-        // The three nodes nearest to this end, nearest first.
-        let last = node_m.len() - 1;
-        let near = if is_high {
-            [last, last - 1, last - 2]
-        } else {
-            [0, 1, 2]
-        };
-        let near_m = near.map(|node| node_m[node]);
-        let wall_m = match side {
-            Side::Open => {
-                // Beyond the last node only the cell next to it is completed, by its first ghost.
-                let first_m = 3.0 * near_m[0] - 3.0 * near_m[1] + near_m[2];
-                return Ok(Self {
-                    ghosts: [Ghost::Parabola(near); GHOSTS],
-                    ghost_m: [first_m, 2.0 * first_m - near_m[0]],
-                    edge_m: near_m[0],
-                });
-            }
-            Side::SlipWall { position_m } | Side::NoSlipWall { position_m, .. } => position_m,
-        };
-        let gap_m = if is_high {
-            wall_m - near_m[0]
-        } else {
-            near_m[0] - wall_m
-        };
-        let cell_m = (near_m[1] - near_m[0]).abs();
-        if !(0.0..cell_m).contains(&gap_m) {
-            let wall = if is_high { "high wall" } else { "low wall" };
-            let allowed = "at the last node or less than a cell beyond it";
-            return Err(refused(axis, wall, wall_m, allowed));
+/// The ghosts beyond one bounded end of a direction with their positions, the nearest first, and the
+/// position of the end \[m\].
+fn bounded_end(
+    axis: &'static str,
+    node_m: &[f64],
+    side: Side,
+    is_high: bool,
+) -> Result<([(Ghost, f64); GHOSTS], f64), Error> {
+    // The three nodes nearest to this end, nearest first.
+    let last = node_m.len() - 1;
+    let near = if is_high {
+        [last, last - 1, last - 2]
+    } else {
+        [0, 1, 2]
+    };
+    let near_m = near.map(|node| node_m[node]);
+    let wall_m = match side {
+        Side::Open => {
+            // Beyond the last node only the cell next to it is completed, by its first ghost.
+            let first_m = 3.0 * near_m[0] - 3.0 * near_m[1] + near_m[2];
+            let ghosts_m = [first_m, 2.0 * first_m - near_m[0]];
+            return Ok((
+                ghosts_m.map(|ghost_m| (Ghost::Parabola(near), ghost_m)),
+                near_m[0],
+            ));
         }
-        // A wall on the last node mirrors the next ones; a wall beyond it mirrors that node too.
-        let mirrored = if gap_m == 0.0 { [1, 2] } else { [0, 1] };
-        Ok(Self {
-            ghosts: mirrored.map(|i| Ghost::Image(near[i], side)),
-            ghost_m: mirrored.map(|i| 2.0 * wall_m - near_m[i]),
-            edge_m: wall_m,
-        })
+        Side::SlipWall { position_m } | Side::NoSlipWall { position_m, .. } => position_m,
+    };
+    let gap_m = if is_high {
+        wall_m - near_m[0]
+    } else {
+        near_m[0] - wall_m
+    };
+    let cell_m = (near_m[1] - near_m[0]).abs();
+    if !(0.0..cell_m).contains(&gap_m) {
+        let wall = if is_high { "high wall" } else { "low wall" };
+        let allowed = "at the last node or less than a cell beyond it";
+        return Err(refused(axis, wall, wall_m, allowed));
     }
+    // A wall on the last node mirrors the next ones; a wall beyond it mirrors that node too.
+    let mirrored = if gap_m == 0.0 { [1, 2] } else { [0, 1] };
+    let ghosts = mirrored.map(|i| (Ghost::Image(near[i], side), 2.0 * wall_m - near_m[i]));
+    Ok((ghosts, wall_m))
 }
 
 /// The kernel `W` of (27) at `x` cells from its node; zero beyond two cells.

@@ -36,7 +36,7 @@ mod wind;
 
 pub use along_flight::AlongFlight;
 pub use axis::{Edges, Side, m4_prime, m4_prime_weights};
-pub use eddies::{Eddies, LineEvaluation, Mode, ModeBand, isotropic_modes};
+pub use eddies::{Eddies, Mode, isotropic_modes};
 pub use grid_wind::{GridSnapshot, PlaneMesh};
 pub use linear::Linear;
 pub use mean_wind::{MeanWind, VON_KARMAN_CONSTANT, WindLaw};
@@ -45,5 +45,5 @@ pub use profile::{CirculationProfile, TwoScale};
 pub use series::Series;
 pub use transported::TransportedPair;
 pub use volume::{VolumeComponent, VolumeSnapshot};
-pub use vortex::{Aircraft, Centres, Ground, Motion, Vortex, VortexPair};
-pub use wind::{SampledLine, Sum, Wind};
+pub use vortex::{Aircraft, Ground, Motion, Vortex, VortexPair};
+pub use wind::{SampledLine, Wind};

@@ -62,17 +62,6 @@ pub struct VortexPair {
     pub motion: Motion,
 }
 
-/// Where the two vortices are at some time.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Centres {
-    /// Lateral coordinate of the vortex at smaller y \[m\].
-    pub left_y_m: f64,
-    /// Lateral coordinate of the vortex at larger y \[m\].
-    pub right_y_m: f64,
-    /// Height of both \[m\].
-    pub height_m: f64,
-}
-
 /// One vortex at some time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vortex {
@@ -169,13 +158,13 @@ impl VortexPair {
         }
     }
 
-    /// The two centres at `time_s`.
+    /// The vortices at smaller and at larger y at `time_s`; both have the same height.
     ///
     /// With [`Motion::Inviscid`] over a ground the path of the point vortices and their images is
     /// used in closed form: with `1/y^2 + 1/z^2 = C` (y the half distance) and `tan(theta) = y/z`,
     /// `cot(2 theta)` falls linearly in time, at the rate `C Gamma0/(8 pi)`. Valid for negative
     /// times too.
-    pub fn centres(&self, time_s: f64) -> Centres {
+    pub fn vortices(&self, time_s: f64) -> [Vortex; 2] {
         let half_m = 0.5 * self.spacing_m;
         let (half_m, height_m) = match (self.motion, self.ground) {
             (Motion::Frozen, _) => (half_m, self.height_m),
@@ -184,22 +173,10 @@ impl VortexPair {
             }
             (Motion::Inviscid, Ground::Image) => self.path_over_ground(half_m, time_s),
         };
-        Centres {
-            left_y_m: self.lateral_position_m - half_m,
-            right_y_m: self.lateral_position_m + half_m,
+        [-1.0, 1.0].map(|sign| Vortex {
+            circulation_m2_s: sign * self.circulation_m2_s,
+            lateral_position_m: self.lateral_position_m + sign * half_m,
             height_m,
-        }
-    }
-
-    /// The left and the right vortex at `time_s`; as [`VortexPair::centres`].
-    pub fn vortices(&self, time_s: f64) -> [Vortex; 2] {
-        let centres = self.centres(time_s);
-        [(-1.0, centres.left_y_m), (1.0, centres.right_y_m)].map(|(sign, lateral_position_m)| {
-            Vortex {
-                circulation_m2_s: sign * self.circulation_m2_s,
-                lateral_position_m,
-                height_m: centres.height_m,
-            }
         })
     }
 

@@ -100,13 +100,6 @@ impl<T: Wind + ?Sized> Wind for std::sync::Arc<T> {
     }
 }
 
-/// The sum of several winds, such as a vortex pair in a cross wind. An empty sum is air at rest.
-#[derive(Default)]
-pub struct Sum {
-    /// The winds that are added, in this order.
-    pub winds: Vec<Box<dyn Wind>>,
-}
-
 /// Lets `act` change each component of `out_m_s` by that of another wind at the same point.
 pub(super) fn combine(
     wind: &dyn Wind,
@@ -133,7 +126,9 @@ pub(super) fn combine(
     Ok(())
 }
 
-impl Wind for Sum {
+/// The sum of several winds in their order, such as a vortex pair in a cross wind. An empty sum is
+/// air at rest.
+impl Wind for Vec<Box<dyn Wind>> {
     fn velocity_into(
         &self,
         points_m: &[[f64; 3]],
@@ -142,7 +137,7 @@ impl Wind for Sum {
     ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         out_m_s.fill([0.0; 3]);
-        self.winds.iter().try_for_each(|wind| {
+        self.iter().try_for_each(|wind| {
             combine(&**wind, points_m, time_s, out_m_s, |sum, other| {
                 *sum += other
             })
@@ -158,7 +153,7 @@ impl Wind for Sum {
     ) -> Result<(), Error> {
         out_m_s.fill(0.0);
         let mut one_m_s = vec![0.0; out_m_s.len()];
-        for wind in &self.winds {
+        for wind in self {
             wind.along_line_into(line, first, time_s, &mut one_m_s)?;
             for (sum, one) in out_m_s.iter_mut().zip(&one_m_s) {
                 *sum += one;
@@ -169,8 +164,7 @@ impl Wind for Sum {
 
     /// The sum of the bounds: sharp when one wind dominates.
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
-        self.winds
-            .iter()
+        self.iter()
             .map(|wind| wind.max_gradient_per_s(time_s))
             .sum()
     }
@@ -184,13 +178,12 @@ mod tests {
     #[test]
     fn sum_adds_velocities_and_gradients() {
         let uniform = |v| Box::new(Linear::uniform(v).unwrap()) as Box<dyn Wind>;
-        let sum = Sum {
-            winds: vec![
-                uniform([1.0, 2.0, 3.0]),
-                Box::<Sum>::default(),
-                uniform([0.5, -4.0, 0.25]),
-            ],
-        };
+        let at_rest: Vec<Box<dyn Wind>> = Vec::new();
+        let sum = vec![
+            uniform([1.0, 2.0, 3.0]),
+            Box::new(at_rest),
+            uniform([0.5, -4.0, 0.25]),
+        ];
         let points = vec![[0.0; 3]; 519];
         let mut out = vec![[9.0; 3]; points.len()];
         sum.velocity_into(&points, 0.0, &mut out).unwrap();
@@ -201,7 +194,7 @@ mod tests {
     #[test]
     fn an_empty_sum_is_calm() {
         let mut out = [[9.0; 3]; 2];
-        Sum::default()
+        Vec::<Box<dyn Wind>>::new()
             .velocity_into(&[[1.0; 3]; 2], 0.0, &mut out)
             .unwrap();
         assert_eq!(out, [[0.0; 3]; 2]);
@@ -211,7 +204,7 @@ mod tests {
     fn every_wind_refuses_slices_of_different_length() {
         let winds: [Box<dyn Wind>; 2] = [
             Box::new(Linear::uniform([1.0; 3]).unwrap()),
-            Box::<Sum>::default(),
+            Box::<Vec<Box<dyn Wind>>>::default(),
         ];
         for wind in &winds {
             let result = wind.velocity_into(&[[0.0; 3]; 3], 0.0, &mut [[0.0; 3]; 2]);

@@ -3,7 +3,7 @@
 
 use approx::assert_relative_eq;
 use wakescope_les::Wind;
-use wakescope_les::winds::{Eddies, LineEvaluation, Mode, ModeBand, SampledLine, isotropic_modes};
+use wakescope_les::winds::{Eddies, Mode, SampledLine, isotropic_modes};
 
 /// Uniform numbers that depend on a seed and an index (splitmix64).
 fn uniform(seed: u64, index: u64) -> f64 {
@@ -24,14 +24,11 @@ fn energy_m3_s2(dissipation_m2_s3: f64, outer_scale_m: f64, k_rad_m: f64) -> f64
 
 /// Modes from 0.1/L to 2 pi/4 m.
 fn modes(seed: u64, dissipation_m2_s3: f64, outer_scale_m: f64, count: usize) -> Vec<Mode> {
-    let band = ModeBand {
-        wavenumber_rad_m: [0.1 / outer_scale_m, std::f64::consts::TAU / 4.0],
-        modes: count,
-        lattice_start: [uniform(seed, 0), uniform(seed, 1)],
-    };
+    let band_rad_m = [0.1 / outer_scale_m, std::f64::consts::TAU / 4.0];
+    let lattice_start = [uniform(seed, 0), uniform(seed, 1)];
     let uniforms = |n: usize| [2, 3, 4].map(|i| uniform(seed, 3 * n as u64 + i));
     let energy = |k| energy_m3_s2(dissipation_m2_s3, outer_scale_m, k);
-    isotropic_modes(&band, energy, uniforms).unwrap()
+    isotropic_modes(band_rad_m, count, lattice_start, energy, uniforms).unwrap()
 }
 
 fn field(seed: u64) -> Eddies {
@@ -127,7 +124,7 @@ fn a_point_has_the_sum_of_sines_and_cosines() {
 fn a_line_has_the_velocities_of_its_points() {
     let count = 1500;
     for elevation_rad in [0.0, 0.12, 1.2, std::f64::consts::FRAC_PI_2] {
-        let all = field(5).with_evaluation(LineEvaluation::All);
+        let all = field(5).summed_at_each_sample();
         let line = line(elevation_rad, 2.0);
         let expected = along_points(&all, &line, count);
         let error = largest_difference(&along(&all, &line, 0, count), &expected);
@@ -150,7 +147,7 @@ fn a_line_over_a_blocking_ground_has_the_velocities_of_its_points() {
     let count = 900;
     // Upwards from the ground, level at 3 m, downwards through the ground.
     for (elevation_rad, height_m) in [(0.1, 0.0), (1.3, 1.0), (0.0, 3.0), (-0.3, 100.0)] {
-        let all = field(5).blocked().with_evaluation(LineEvaluation::All);
+        let all = field(5).blocked().summed_at_each_sample();
         let line = line(elevation_rad, height_m);
         let expected = along_points(&all, &line, count);
         for (field, largest) in [(&all, 1e-12), (&field(5).blocked(), 2e-3 * SPREAD_M_S)] {
@@ -170,7 +167,7 @@ fn a_line_over_a_blocking_ground_has_the_velocities_of_its_points() {
 #[test]
 fn a_sample_has_the_same_bits_whatever_is_computed_with_it() {
     let open = field(9);
-    let all = field(9).with_evaluation(LineEvaluation::All);
+    let all = field(9).summed_at_each_sample();
     for field in [&open, &all, &field(9).blocked()] {
         for step_m in [0.3, 0.7, 25.0] {
             let line = SampledLine {
@@ -221,7 +218,7 @@ fn a_carried_field_is_the_field_at_a_moved_origin() {
 
 /// Standard deviation and largest value of the gradient along lines \[1/s\].
 fn gradients_per_s(field: &Eddies, elevations_rad: &[f64], samples: usize) -> (f64, f64) {
-    let field = field.clone().with_evaluation(LineEvaluation::All);
+    let field = field.clone().summed_at_each_sample();
     let mut squares = 0.0;
     let mut largest = 0.0_f64;
     for &elevation_rad in elevations_rad {

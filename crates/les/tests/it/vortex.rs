@@ -147,12 +147,12 @@ fn path_over_the_ground_follows_the_independent_integration() {
     let mut rows = 0;
     for line in text.lines().filter(|l| !l.starts_with('#')) {
         let row: Vec<f64> = line.split(',').map(|x| x.trim().parse().unwrap()).collect();
-        let centres = pair.centres(pair.time_s(row[0]));
-        let half = 0.5 * (centres.right_y_m - centres.left_y_m) / pair.spacing_m;
+        let [left, right] = pair.vortices(pair.time_s(row[0]));
+        let half = 0.5 * (right.lateral_position_m - left.lateral_position_m) / pair.spacing_m;
         assert_abs_diff_eq!(half, row[1], epsilon = 2e-9);
-        assert_abs_diff_eq!(centres.height_m / pair.spacing_m, row[2], epsilon = 2e-9);
+        assert_abs_diff_eq!(left.height_m / pair.spacing_m, row[2], epsilon = 2e-9);
         assert_abs_diff_eq!(
-            0.5 * (centres.left_y_m + centres.right_y_m),
+            0.5 * (left.lateral_position_m + right.lateral_position_m),
             400.0,
             epsilon = 1e-10
         );
@@ -172,14 +172,15 @@ fn path_keeps_its_invariant_and_obeys_the_velocity_of_the_other_vortices() {
     let invariant = 4.0 / (47.0 * 47.0) + 1.0 / (80.0 * 80.0);
     for step in -20..400 {
         let time_s = 2.0 * f64::from(step);
-        let now = pair.centres(time_s);
-        let half = 0.5 * (now.right_y_m - now.left_y_m);
+        let [left, now] = pair.vortices(time_s);
+        let half = 0.5 * (now.lateral_position_m - left.lateral_position_m);
         let kept = 1.0 / (half * half) + 1.0 / (now.height_m * now.height_m);
         assert_relative_eq!(kept, invariant, max_relative = 1e-12);
         // At its own centre a vortex of any core size induces nothing, so the flow there carries it.
-        let flow = velocity(pair, now.right_y_m, now.height_m, time_s);
-        let (ahead, behind) = (pair.centres(time_s + 1e-3), pair.centres(time_s - 1e-3));
-        let speed_y = (ahead.right_y_m - behind.right_y_m) / 2e-3;
+        let flow = velocity(pair, now.lateral_position_m, now.height_m, time_s);
+        let [_, ahead] = pair.vortices(time_s + 1e-3);
+        let [_, behind] = pair.vortices(time_s - 1e-3);
+        let speed_y = (ahead.lateral_position_m - behind.lateral_position_m) / 2e-3;
         let speed_z = (ahead.height_m - behind.height_m) / 2e-3;
         assert_abs_diff_eq!(speed_y, flow[1], epsilon = 1e-6);
         assert_abs_diff_eq!(speed_z, flow[2], epsilon = 1e-6);
@@ -193,9 +194,9 @@ fn without_a_ground_the_pair_descends_straight_at_v0() {
         ground: Ground::None,
         ..heavy()
     };
-    let later = pair.centres(pair.time_s(3.0));
-    assert_relative_eq!(later.height_m, 47.0 - 3.0 * 47.0, max_relative = 1e-12);
-    assert_eq!(later.left_y_m, 376.5);
+    let [left, _] = pair.vortices(pair.time_s(3.0));
+    assert_relative_eq!(left.height_m, 47.0 - 3.0 * 47.0, max_relative = 1e-12);
+    assert_eq!(left.lateral_position_m, 376.5);
     assert_relative_eq!(
         pair.time_s(3.0) * pair.descent_speed_m_s() / pair.spacing_m,
         3.0,
@@ -260,7 +261,7 @@ fn a_pair_without_circulation_is_calm_and_stays_where_it_is() {
         ..heavy()
     };
     assert_eq!(velocity(pair, 380.0, 40.0, 100.0), [0.0, 0.0, 0.0]);
-    assert_relative_eq!(pair.centres(100.0).height_m, 47.0, max_relative = 1e-14);
+    assert_relative_eq!(pair.vortices(100.0)[0].height_m, 47.0, max_relative = 1e-14);
     assert_eq!(pair.wind().unwrap().max_gradient_per_s(0.0), 0.0);
 }
 

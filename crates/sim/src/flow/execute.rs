@@ -198,8 +198,8 @@ fn outcome(
 
 /// A run from the initial field of its case, and a warning where the projection takes much from that.
 fn start(setup: Setup, plan: RunPlan, warnings: &mut Vec<String>) -> Result<Run, Error> {
-    let (flow, start) = setup.start()?;
-    let removed = 1.0 - start.kinetic_energy_m5_s2 / start.given_energy_m5_s2;
+    let (flow, given_m5_s2) = setup.start()?;
+    let removed = 1.0 - flow.kinetic_energy_m5_s2() / given_m5_s2;
     if removed > 0.01 {
         warnings.push(format!(
             "the projection of the initial field onto fields without divergence removed {:.3} % of its energy",

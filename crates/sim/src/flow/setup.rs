@@ -3,7 +3,7 @@
 use crate::Error;
 use wakescope_les::analysis::{WakeMeter, WakeScales};
 pub(super) use wakescope_les::cases::Initial;
-use wakescope_les::solver::{Stability, StartReport, UndampedGrowth};
+use wakescope_les::solver::{Stability, UndampedGrowth};
 use wakescope_les::{Flow, FlowSettings, Mesh};
 
 /// All that a simulation is made of.
@@ -49,7 +49,8 @@ impl Setup {
         }
     }
 
-    pub(super) fn start(self) -> Result<(Flow, StartReport), Error> {
+    /// The flow at its start, and its kinetic energy before the projection, m^5/s^2.
+    pub(super) fn start(self) -> Result<(Flow, f64), Error> {
         let Self {
             mesh,
             settings,

@@ -86,9 +86,7 @@ impl SceneWind {
             time_s: move |time_s| time_s - start_s,
         };
         Ok(Self {
-            wind: Arc::new(les::winds::Sum {
-                winds: vec![Box::new(self.steady.clone()), Box::new(later)],
-            }),
+            wind: summed(vec![Box::new(self.steady.clone()), Box::new(later)]),
             has_eddies: true,
             ..self.clone()
         })
@@ -103,9 +101,11 @@ impl SceneWind {
                 let vortices = found.wind(pair)?;
                 let wind: Box<dyn Wind> = match pair.cross_wind_m_s {
                     0.0 => vortices,
-                    lateral_m_s => Box::new(les::winds::Sum {
-                        winds: vec![vortices, Box::new(uniform_wind(lateral_m_s, 0.0)?)],
-                    }),
+                    lateral_m_s => {
+                        let across = Box::new(uniform_wind(lateral_m_s, 0.0)?);
+                        let sum: Vec<Box<dyn Wind>> = vec![vortices, across];
+                        Box::new(sum)
+                    }
                 };
                 let end_s = match pair.aircraft {
                     None => found.last_age_s(),
@@ -136,9 +136,7 @@ impl SceneWind {
         let mut field_times_s = self.field_times_s;
         field_times_s.extend(other.field_times_s.iter().map(|t| t - by_s));
         field_times_s.sort_by(f64::total_cmp);
-        let wind: Arc<dyn Wind> = Arc::new(les::winds::Sum {
-            winds: vec![Box::new(self.steady), later],
-        });
+        let wind = summed(vec![Box::new(self.steady), later]);
         let source = if self.source == other.source {
             self.source
         } else {
@@ -276,7 +274,7 @@ fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
         | Flow::Eddies(_)
         | Flow::VortexPair(_)
         | Flow::Simulated(_)
-        | Flow::Fields(_) => Box::<les::winds::Sum>::default(),
+        | Flow::Fields(_) => Box::<Vec<Box<dyn Wind>>>::default(),
         Flow::Wind(wind) => Box::new(wind.simulated()?),
         Flow::Uniform {
             lateral_m_s,
@@ -312,4 +310,9 @@ pub(crate) fn circulation_profile(profile: CoreProfile) -> les::CirculationProfi
         CoreProfile::Algebraic => les::CirculationProfile::Algebraic,
         CoreProfile::LambOseen => les::CirculationProfile::LambOseen,
     }
+}
+
+/// The sum of winds.
+fn summed(winds: Vec<Box<dyn Wind>>) -> Arc<dyn Wind> {
+    Arc::new(winds)
 }

@@ -360,10 +360,10 @@ mod tests {
         let Flow::VortexPair(pair) = moving.scene().flow else {
             unreachable!()
         };
-        let at = vortex_pair(&pair).centres(left.time_s);
+        let [at, _] = vortex_pair(&pair).vortices(left.time_s);
         assert_eq!(
             (left.lateral_position_m.value, left.height_m.value),
-            (at.left_y_m, at.height_m)
+            (at.lateral_position_m, at.height_m)
         );
         let line = moving
             .geometry

@@ -22,7 +22,6 @@ pub use vortex_pair::VortexPairCase;
 
 use super::flow::Flow;
 use super::mesh::{Direction, Mapping, Mesh};
-use super::report::StartReport;
 use super::settings::FlowSettings;
 use crate::Error;
 
@@ -40,7 +39,7 @@ impl Initial {
     /// # Errors
     /// As [`Flow::new`], and [`Error::LengthMismatch`] for velocities that are not one for each
     /// cell.
-    pub fn start(&self, mesh: Mesh, settings: FlowSettings) -> Result<(Flow, StartReport), Error> {
+    pub fn start(&self, mesh: Mesh, settings: FlowSettings) -> Result<(Flow, f64), Error> {
         match self {
             Self::Field(field) => Flow::new(mesh, settings, field),
             Self::Faces(faces) => Flow::at_rest(mesh, settings)?.with_faces(faces),
@@ -94,7 +93,7 @@ impl Case {
     ///
     /// # Errors
     /// As [`Flow::new`].
-    pub fn start(&self) -> Result<(Flow, StartReport), Error> {
+    pub fn start(&self) -> Result<(Flow, f64), Error> {
         self.initial.start(self.mesh.clone(), self.settings.clone())
     }
 }

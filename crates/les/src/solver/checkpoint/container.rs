@@ -168,50 +168,39 @@ fn open_with_length(path: &Path) -> io::Result<(File, u64)> {
     Ok((file, length))
 }
 
-/// The numbers before the first section.
-#[derive(Debug)]
-struct Head {
-    /// Bytes of all sections.
-    section_bytes: u64,
-    planes: u64,
-    plane_bytes: u64,
+/// Checks the magic and the version of a file that begins with `head`; returns the bytes of all
+/// sections, and the number of planes with the bytes of each.
+fn parse_head(path: &Path, head: &[u8], supported: u32) -> Result<(u64, [u64; 2]), Error> {
+    let magic = head.len().min(MAGIC.len());
+    if head.is_empty() || head[..magic] != MAGIC[..magic] {
+        return Err(Error::NotACheckpoint {
+            path: path.to_owned(),
+        });
+    }
+    let words = head[magic..].as_chunks::<8>().0;
+    let &[version_and_sections, section_bytes, planes, plane_bytes] = words else {
+        return Err(damaged(path, "it ends within its first bytes"));
+    };
+    let version = u64::from_le_bytes(version_and_sections) as u32;
+    if version != supported {
+        return Err(Error::CheckpointVersion {
+            path: path.to_owned(),
+            found: version,
+            supported,
+        });
+    }
+    Ok((
+        u64::from_le_bytes(section_bytes),
+        [planes, plane_bytes].map(u64::from_le_bytes),
+    ))
 }
 
-impl Head {
-    /// Checks the magic and the version.
-    fn parse(path: &Path, head: &[u8], supported: u32) -> Result<Self, Error> {
-        let magic = head.len().min(MAGIC.len());
-        if head.is_empty() || head[..magic] != MAGIC[..magic] {
-            return Err(Error::NotACheckpoint {
-                path: path.to_owned(),
-            });
-        }
-        let words = head[magic..].as_chunks::<8>().0;
-        let &[version_and_sections, section_bytes, planes, plane_bytes] = words else {
-            return Err(damaged(path, "it ends within its first bytes"));
-        };
-        let version = u64::from_le_bytes(version_and_sections) as u32;
-        if version != supported {
-            return Err(Error::CheckpointVersion {
-                path: path.to_owned(),
-                found: version,
-                supported,
-            });
-        }
-        Ok(Self {
-            section_bytes: u64::from_le_bytes(section_bytes),
-            planes: u64::from_le_bytes(planes),
-            plane_bytes: u64::from_le_bytes(plane_bytes),
-        })
-    }
-
-    /// Where the first plane begins, if a file of `length` bytes is as long as it should be.
-    fn first_plane(&self, length: u64) -> Option<u64> {
-        let start = (HEAD_BYTES + CHECKSUM_BYTES).checked_add(self.section_bytes)?;
-        let each = self.plane_bytes.checked_add(CHECKSUM_BYTES)?;
-        let end = start.checked_add(self.planes.checked_mul(each)?)?;
-        (end == length).then_some(start)
-    }
+/// Where the first plane begins, if a file of `length` bytes is as long as it should be.
+fn first_plane(section_bytes: u64, [planes, plane_bytes]: [u64; 2], length: u64) -> Option<u64> {
+    let start = (HEAD_BYTES + CHECKSUM_BYTES).checked_add(section_bytes)?;
+    let each = plane_bytes.checked_add(CHECKSUM_BYTES)?;
+    let end = start.checked_add(planes.checked_mul(each)?)?;
+    (end == length).then_some(start)
 }
 
 /// A file whose sections are whole, and whose planes are read one by one.
@@ -235,8 +224,8 @@ impl Reader {
         first_bytes
             .read_to_end(&mut head)
             .map_err(|error| refused("read", path, &error))?;
-        let parsed = Head::parse(path, &head, supported)?;
-        let Some(start) = parsed.first_plane(length) else {
+        let (section_bytes, counts) = parse_head(path, &head, supported)?;
+        let Some(start) = first_plane(section_bytes, counts, length) else {
             return Err(damaged(path, "it has not the length that it should have"));
         };
         let mut reader = Self {
@@ -247,9 +236,9 @@ impl Reader {
                 start,
                 checksum: [0; CHECKSUM_BYTES as usize],
             },
-            counts: [parsed.planes, parsed.plane_bytes],
+            counts,
         };
-        let mut content = vec![0; parsed.section_bytes as usize];
+        let mut content = vec![0; section_bytes as usize];
         let mut stored = reader.planes.checksum;
         reader.fill(&mut content)?;
         reader.fill(&mut stored)?;

@@ -28,33 +28,15 @@ use super::transform::{LineTransform, RowTransform, TransformDirection, Work};
 use crate::Error;
 use crate::solver::slabs::Slabs;
 
-/// What is done along axis 1 or 2.
-#[derive(Debug)]
-enum Along {
-    Transformed(LineTransform),
-    Factorised(BandedCholesky),
-}
-
-impl Along {
-    /// What is done along `axis`, and its eigenvalues, none if it is factorised.
-    fn new(layout: &Layout, axis: usize) -> (Self, Vec<f64>) {
-        let line = &layout.line[axis];
-        if banded_axis(layout) == Some(axis)
-            && let Some(band) = BandedCholesky::new(line)
-        {
-            return (Self::Factorised(band), Vec::new());
-        }
-        let (transform, values) = LineTransform::new(line);
-        (Self::Transformed(transform), values)
-    }
-}
-
 /// The direct solver of one mesh.
 #[derive(Debug)]
 pub(crate) struct Direct {
     slabs: Slabs,
     rows: RowTransform,
-    along: [Along; 2],
+    /// The transforms along the axes 1 and 2; none along that of the banded operator.
+    along: [Option<LineTransform>; 2],
+    /// The axis that is not transformed, and its banded operator.
+    band: Option<(usize, BandedCholesky)>,
     /// Eigenvalues of the three axes; empty for the factorised one.
     value: [Vec<f64>; 3],
     /// Factor of the transforms, with the sign of the right side.
@@ -68,13 +50,23 @@ impl Direct {
     /// Factorises the mesh.
     pub(crate) fn new(layout: &Layout) -> Self {
         let (rows, values, factor) = RowTransform::new(&layout.line[0]);
-        let (along_1, values_1) = Along::new(layout, 1);
-        let (along_2, values_2) = Along::new(layout, 2);
+        let band = banded_axis(layout)
+            .and_then(|axis| Some((axis, BandedCholesky::new(&layout.line[axis])?)));
+        let mut along = [None, None];
+        let mut value = [values, Vec::new(), Vec::new()];
+        for axis in [1, 2] {
+            if band.as_ref().is_none_or(|(banded, _)| *banded != axis) {
+                let (transform, values) = LineTransform::new(&layout.line[axis]);
+                along[axis - 1] = Some(transform);
+                value[axis] = values;
+            }
+        }
         Self {
             slabs: layout.slabs.clone(),
             rows,
-            along: [along_1, along_2],
-            value: [values, values_1, values_2],
+            along,
+            band,
+            value,
             scale: -factor,
         }
     }
@@ -84,14 +76,15 @@ impl Direct {
         if !self.by_planes() {
             self.lines(TransformDirection::Forward, 0, field, shape);
         }
-        match &self.along {
-            [Along::Factorised(band), _] => {
+        match (&self.band, &self.along[1]) {
+            (Some((axis, band)), _) => {
+                // Nothing is transformed where axis 2 is that of the band.
                 self.lines(TransformDirection::Forward, 1, field, shape);
-                self.banded(1, band, field, shape, first);
+                self.banded(*axis, band, field, shape, first);
                 self.lines(TransformDirection::Inverse, 1, field, shape);
             }
-            [_, Along::Factorised(band)] => self.banded(2, band, field, shape, first),
-            [_, Along::Transformed(transform)] => self.divide(transform, field, shape, first),
+            (None, Some(transform)) => self.divide(transform, field, shape, first),
+            (None, None) => {}
         }
         if !self.by_planes() {
             self.lines(TransformDirection::Inverse, 0, field, shape);
@@ -117,7 +110,7 @@ impl Direct {
                 if direction == TransformDirection::Forward {
                     self.rows.apply(direction, slab, work);
                 }
-                if let (true, Along::Transformed(axis)) = (self.by_planes(), &self.along[0]) {
+                if let (true, Some(axis)) = (self.by_planes(), &self.along[0]) {
                     let mut rows: Vec<&mut [f64]> = slab.chunks_mut(n0).collect();
                     axis.apply(direction, &mut rows, work);
                 }
@@ -129,7 +122,7 @@ impl Direct {
 
     /// Transforms along axis `which + 1` if it is transformed.
     fn lines(&self, direction: TransformDirection, which: usize, field: &mut [f64], shape: Shape) {
-        let Along::Transformed(transform) = &self.along[which] else {
+        let Some(transform) = &self.along[which] else {
             return;
         };
         let mut pencils = pencils(field, shape, which + 1, usize::MAX);

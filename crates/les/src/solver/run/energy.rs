@@ -22,7 +22,7 @@
 use super::super::flow::Flow;
 use super::super::mesh::Wall;
 use super::super::settings::TimeScheme;
-use crate::error::{EnergyGrowth, Error};
+use crate::error::Error;
 use crate::solver::report::StepReport;
 
 /// Share of the energy by which a flow may exceed what it may have. A stable step errs by much
@@ -145,15 +145,15 @@ fn magnitude(v: [f64; 3]) -> f64 {
 
 fn grew(flow: &Flow, allowed_m5_s2: f64, rate_per_s: f64) -> Result<Error, Error> {
     let (axis, place) = flow.strongest_short_wave()?;
-    Ok(Error::EnergyGrew(Box::new(EnergyGrowth {
+    Ok(Error::EnergyGrew {
         step: flow.steps(),
         time_s: flow.time_s(),
         energy_m5_s2: flow.kinetic_energy_m5_s2(),
         allowed_m5_s2,
         rate_per_s,
-        place: flow.place(axis, place),
+        place: Box::new(flow.place(axis, place)),
         cause: cause(flow)?,
-    })))
+    })
 }
 
 /// The likeliest cause, and what to do.

@@ -132,11 +132,8 @@ pub trait RunObserver {
     }
 }
 
-/// An observer that takes no notice.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Silent;
-
-impl RunObserver for Silent {}
+/// Observes nothing.
+impl RunObserver for () {}
 
 /// A simulation with its plan.
 #[derive(Debug)]

@@ -188,10 +188,10 @@ fn a_rank_that_panics_or_cannot_read_stops_the_others() {
     let panicking = |ranks: Arc<dyn Ranks>| {
         let last = ranks.rank() == 2;
         let mut run = start(&case, ranks, plan(&path, Some(2)))?;
-        run.to_end(&mut Silent)?;
+        run.to_end(&mut ())?;
         assert!(!last, "this rank breaks down");
         run.plan.pause_after_steps = None;
-        run.to_end(&mut Silent)
+        run.to_end(&mut ())
     };
     let found = words(on_threads(3, panicking));
     let lost = Error::RankLost { rank: 2 }.to_string();

@@ -57,14 +57,6 @@ pub(super) struct Filter {
     axes: [[Neighbours; 3]; 3],
 }
 
-/// Scratch of one task.
-#[derive(Debug)]
-struct Scratch {
-    plane: Vec<f64>,
-    row: Vec<f64>,
-    padded: Vec<f64>,
-}
-
 impl Filter {
     pub(super) fn new(layout: &Layout, order: usize) -> Self {
         let axes = std::array::from_fn(|component| {
@@ -92,19 +84,12 @@ impl Filter {
                 .par_chunks_mut(shape.plane())
                 .zip(shape.own());
             planes.for_each_init(
-                || Scratch::new(shape),
+                || {
+                    let n = shape.n[0];
+                    [shape.plane(), n, n + 2 * HALO].map(|length| vec![0.0; length])
+                },
                 |scratch, (out, k)| small_plane(self, axes, field, k, out, scratch),
             );
-        }
-    }
-}
-
-impl Scratch {
-    fn new(shape: Shape) -> Self {
-        Self {
-            plane: vec![0.0; shape.plane()],
-            row: vec![0.0; shape.n[0]],
-            padded: vec![0.0; shape.n[0] + 2 * HALO],
         }
     }
 }
@@ -176,11 +161,10 @@ fn small_plane(
     field: &[f64],
     k: usize,
     out: &mut [f64],
-    scratch: &mut Scratch,
+    [plane, row, padded]: &mut [Vec<f64>; 3],
 ) {
     let shape = filter.shape;
     let n = shape.n[0];
-    let Scratch { plane, row, padded } = scratch;
     for (j, low) in plane.chunks_mut(n).enumerate() {
         smooth(low, &filter.weights, &over[..], k, |index| {
             &field[shape.row(j, index)]

@@ -43,7 +43,7 @@ use filter::{Filter, HIGHEST_ORDER};
 use operators::Operators;
 use stress::{add_divergence_row, update_stress};
 pub(crate) use viscosity::Largest;
-use viscosity::{Formula, eddy_viscosity};
+use viscosity::eddy_viscosity;
 
 /// How the eddies below the mesh are modelled.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -100,7 +100,7 @@ impl SubgridModel {
 /// A subgrid model at work on one mesh.
 #[derive(Debug)]
 pub(crate) struct Subgrid {
-    formula: Formula,
+    model: SubgridModel,
     operators: Operators,
     /// The filter of the multiscale model, and the small scales of the last two components.
     small: Option<(Filter, [Aligned; 2])>,
@@ -120,12 +120,13 @@ impl Subgrid {
     /// # Errors
     /// [`Error::OutOfRange`] for a constant that is not positive and an order that is not 1 to 4.
     pub(crate) fn new(layout: &Layout, model: SubgridModel) -> Result<Option<Self>, Error> {
-        let Some((formula, order)) = formula_and_order(model)? else {
+        let order = filter_order(model)?;
+        if model == SubgridModel::None {
             return Ok(None);
-        };
+        }
         let cells = layout.shape.len();
         Ok(Some(Self {
-            formula,
+            model,
             operators: Operators::new(layout),
             small: order.map(|order| {
                 (
@@ -157,7 +158,7 @@ impl Subgrid {
     ) -> Result<(), Error> {
         let Self {
             operators,
-            formula,
+            model,
             viscosity_m2_s: viscosity,
             small,
             slabs,
@@ -166,7 +167,7 @@ impl Subgrid {
         } = self;
         self.largest = slabs.largest(eddy_viscosity(
             operators,
-            *formula,
+            *model,
             velocity_m_s,
             limit_per_s,
             viscosity,
@@ -211,44 +212,25 @@ impl Subgrid {
     }
 }
 
-/// The formula of a model, and the order of its filter if it has one.
+/// The order of the filter of a checked model, if it has one.
 ///
 /// # Errors
 /// As [`Subgrid::new`].
-pub(super) fn formula_and_order(
-    model: SubgridModel,
-) -> Result<Option<(Formula, Option<usize>)>, Error> {
-    Ok(match model {
-        SubgridModel::None => None,
-        SubgridModel::Smagorinsky { constant } => Some((
-            Formula::Smagorinsky {
-                square: square(constant)?,
-            },
-            None,
-        )),
-        SubgridModel::Wale { constant } => Some((
-            Formula::Wale {
-                square: square(constant)?,
-            },
-            None,
-        )),
+pub(super) fn filter_order(model: SubgridModel) -> Result<Option<usize>, Error> {
+    let (constant, order) = match model {
+        SubgridModel::None => return Ok(None),
+        SubgridModel::Smagorinsky { constant } | SubgridModel::Wale { constant } => {
+            (constant, None)
+        }
         SubgridModel::MultiscaleWale { constant, order } => {
             check("order", order as f64, "1 to 4", |_| {
                 (1..=HIGHEST_ORDER).contains(&order)
             })?;
-            Some((
-                Formula::Wale {
-                    square: square(constant)?,
-                },
-                Some(order),
-            ))
+            (constant, Some(order))
         }
-    })
-}
-
-fn square(constant: f64) -> Result<f64, Error> {
+    };
     check("constant", constant, "finite and positive", |c| c > 0.0)?;
-    Ok(constant * constant)
+    Ok(order)
 }
 
 #[cfg(test)]

@@ -10,16 +10,8 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::rows::{HALO, cut_rows};
+use super::SubgridModel;
 use super::operators::{Operators, Row};
-
-/// Which formula gives the eddy viscosity, with the square of its constant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::solver) enum Formula {
-    /// `(C Delta)^2 sqrt(2 S:S)`.
-    Smagorinsky { square: f64 },
-    /// `(C Delta)^2 (Sd:Sd)^(3/2)/[(S:S)^(5/2) + (Sd:Sd)^(5/4)]`.
-    Wale { square: f64 },
-}
 
 /// Values of one row at a time.
 #[derive(Debug)]
@@ -35,7 +27,7 @@ struct Scratch {
 /// have had without this limit.
 pub(super) fn eddy_viscosity(
     operators: &Operators,
-    formula: Formula,
+    model: SubgridModel,
     velocity: [&[f64]; 3],
     limit_per_s: f64,
     viscosity: &mut [f64],
@@ -48,7 +40,7 @@ pub(super) fn eddy_viscosity(
     let largest = planes.map_init(
         || Scratch::new(n),
         |scratch, (plane, k)| {
-            viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch)
+            viscosity_plane(operators, model, velocity, limit_per_s, k, plane, scratch)
         },
     );
     largest.reduce(Largest::default, larger)
@@ -75,7 +67,7 @@ fn larger(a: Largest, b: Largest) -> Largest {
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn viscosity_plane(
     operators: &Operators,
-    formula: Formula,
+    model: SubgridModel,
     velocity: [&[f64]; 3],
     limit_per_s: f64,
     k: usize,
@@ -94,11 +86,15 @@ fn viscosity_plane(
         let across = operators.width[1][j] * operators.width[2][k];
         let gradient = &scratch.gradient;
         let width = &operators.width[0];
-        match formula {
-            Formula::Smagorinsky { square } => {
-                apply(row, gradient, square * across, width, smagorinsky)
+        match model {
+            SubgridModel::None => row.fill(0.0),
+            SubgridModel::Smagorinsky { constant } => {
+                let scale = constant * constant * across;
+                apply(row, gradient, scale, width, smagorinsky);
             }
-            Formula::Wale { square } => apply(row, gradient, square * across, width, wale),
+            SubgridModel::Wale { constant } | SubgridModel::MultiscaleWale { constant, .. } => {
+                apply(row, gradient, constant * constant * across, width, wale);
+            }
         }
         let decay = operators.decay[1][j] + operators.decay[2][k];
         largest = larger(largest, limit(row, &operators.decay[0], decay, limit_per_s));

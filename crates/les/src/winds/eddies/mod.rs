@@ -23,7 +23,7 @@ mod modes;
 mod sin_cos;
 mod waves;
 
-pub use modes::{Mode, ModeBand, isotropic_modes};
+pub use modes::{Mode, isotropic_modes};
 
 use super::wind::{SampledLine, Wind};
 use crate::error::{Error, check, check_lengths};
@@ -37,16 +37,6 @@ const LANES: usize = 8;
 /// Standard deviations of the gradient that count as its bound.
 const DEVIATIONS: f64 = 6.0;
 
-/// How sums along a line are computed.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum LineEvaluation {
-    /// Long waves at few nodes, interpolated: error some 2.4e-4 of the standard deviation.
-    #[default]
-    Levels,
-    /// All waves at each sample: error below 1e-12.
-    All,
-}
-
 /// A field of turbulence made of modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Eddies {
@@ -54,7 +44,8 @@ pub struct Eddies {
     /// Horizontal velocity (x, y) that carries the field \[m/s\].
     carried_m_s: [f64; 2],
     is_blocked: bool,
-    evaluation: LineEvaluation,
+    /// Whether long waves are summed at few nodes.
+    is_coarse: bool,
     max_gradient_per_s: f64,
 }
 
@@ -72,7 +63,7 @@ impl Eddies {
             modes,
             carried_m_s: [0.0; 2],
             is_blocked: false,
-            evaluation: LineEvaluation::Levels,
+            is_coarse: true,
             max_gradient_per_s,
         })
     }
@@ -102,10 +93,15 @@ impl Eddies {
         }
     }
 
-    /// The same field with another computation of sums along lines.
+    /// The same field with all waves summed at each sample of a line: error below 1e-12. Otherwise
+    /// long waves are summed at few nodes and interpolated: error some 2.4e-4 of the standard
+    /// deviation.
     #[must_use]
-    pub fn with_evaluation(self, evaluation: LineEvaluation) -> Self {
-        Self { evaluation, ..self }
+    pub fn summed_at_each_sample(self) -> Self {
+        Self {
+            is_coarse: false,
+            ..self
+        }
     }
 
     /// The modes of waves longer than this \[m\] alone.
@@ -140,7 +136,6 @@ impl Eddies {
     /// Waves of the radial velocity along a line.
     fn waves(&self, line: &SampledLine, time_s: f64) -> LineWaves {
         let mut waves = LineWaves::default();
-        let is_coarse = self.evaluation == LineEvaluation::Levels;
         let origin_m = self.carried_point_m(line.origin_m, time_s);
         let e = line.direction;
         for mode in &self.modes {
@@ -152,7 +147,7 @@ impl Eddies {
                 step_rad: dot(k, e) * line.step_m,
                 ..Wave::default()
             };
-            waves.push(wave, is_coarse);
+            waves.push(wave, self.is_coarse);
             let kappa = k[0].hypot(k[1]);
             if !self.is_blocked || kappa == 0.0 {
                 continue;
@@ -168,7 +163,7 @@ impl Eddies {
                 growth: -kappa * origin_m[2],
                 growth_step: -kappa * e[2] * line.step_m,
             };
-            waves.push_decaying(image, is_coarse);
+            waves.push_decaying(image, self.is_coarse);
         }
         waves
     }

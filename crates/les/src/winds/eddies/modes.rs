@@ -55,21 +55,12 @@ impl Mode {
     }
 }
 
-/// The part of a spectrum that modes represent, and how.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ModeBand {
-    /// Smallest and largest wave number \[rad/m\].
-    pub wavenumber_rad_m: [f64; 2],
-    /// Number of modes.
-    pub modes: usize,
-    /// Where the lattice of directions begins, two numbers from 0 to 1.
-    pub lattice_start: [f64; 2],
-}
-
-/// Modes of isotropic turbulence, (A6): wave numbers equally spaced in the logarithm, directions on
+/// `count` modes of isotropic turbulence between two wave numbers, (A6): wave numbers equally spaced in the logarithm, directions on
 /// a lattice, amplitudes of fixed size
 /// `a_n = sqrt(2 E(k_n) k_n s) (e_1 exp(i phi_1) + e_2 exp(i phi_2))`.
 ///
+/// `band_rad_m` is the smallest and the largest wave number \[rad/m\], `lattice_start` where the
+/// lattice of directions begins, two numbers from 0 to 1;
 /// `energy_m3_s2` is the energy spectrum `E(k)` \[m^3/s^2\]. Each mode has the energy of its interval
 /// of ln k, so that the mean structure function is exact in the band for any number of modes.
 /// `uniforms(n)` returns three independent uniform numbers from 0 to 1 of mode n: its place in the
@@ -78,24 +69,25 @@ pub struct ModeBand {
 /// # Errors
 /// [`Error::OutOfRange`] for an empty band, no modes, or a spectrum that is not finite.
 pub fn isotropic_modes(
-    band: &ModeBand,
+    band_rad_m: [f64; 2],
+    count: usize,
+    lattice_start: [f64; 2],
     energy_m3_s2: impl Fn(f64) -> f64,
     mut uniforms: impl FnMut(usize) -> [f64; 3],
 ) -> Result<Vec<Mode>, Error> {
-    let [smallest, largest] = band.wavenumber_rad_m;
+    let [smallest, largest] = band_rad_m;
     check("smallest wave number", smallest, "above 0", |k| k > 0.0)?;
     let allowed = "above the smallest wave number";
     check("largest wave number", largest, allowed, |k| k > smallest)?;
-    let count = band.modes as f64;
-    check("modes", count, "at least 1", |count| count >= 1.0)?;
-    let interval = (largest / smallest).ln() / count;
-    let mut modes = Vec::with_capacity(band.modes);
-    for n in 0..band.modes {
+    check("modes", count as f64, "at least 1", |count| count >= 1.0)?;
+    let interval = (largest / smallest).ln() / count as f64;
+    let mut modes = Vec::with_capacity(count);
+    for n in 0..count {
         let [place, first, second] = uniforms(n);
         let k = smallest * (interval * (n as f64 + place)).exp();
         let energy = energy_m3_s2(k);
         check("energy spectrum", energy, "0 or above", |e| e >= 0.0)?;
-        let direction = lattice_direction(band.lattice_start, n);
+        let direction = lattice_direction(lattice_start, n);
         let [e1, e2] = across(direction);
         let size_m_s = (2.0 * energy * k * interval).sqrt();
         let (sin1, cos1) = (TAU * first).sin_cos();

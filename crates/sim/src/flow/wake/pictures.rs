@@ -85,9 +85,10 @@ impl FinishedWake {
         };
         let mut paths = [Vec::new(), Vec::new()];
         for tau in self.column("tau")? {
-            let at = pair.centres(pair.time_s(*tau));
-            for (path, y_m) in paths.iter_mut().zip([at.left_y_m, at.right_y_m]) {
-                path.push((y_m / scales.spacing_m, at.height_m / scales.spacing_m));
+            let vortices = pair.vortices(pair.time_s(*tau));
+            for (path, vortex) in paths.iter_mut().zip(vortices) {
+                let y = vortex.lateral_position_m / scales.spacing_m;
+                path.push((y, vortex.height_m / scales.spacing_m));
             }
         }
         Ok(paths)

@@ -10,7 +10,7 @@ use crate::streams::stream;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::Rng;
 use std::f64::consts::TAU;
-use wakescope_les::winds::{Eddies, LineEvaluation, ModeBand, isotropic_modes};
+use wakescope_les::winds::{Eddies, isotropic_modes};
 
 /// The turbulence of a realisation; none where the scene has none.
 ///
@@ -29,11 +29,8 @@ pub(super) fn eddies(scene: &Scene, realisation: usize) -> Result<Option<Eddies>
     };
     let stage = format!("eddies {realisation}");
     let mut lattice = stream(scene.seed, &format!("{stage} lattice"), 0);
-    let band = ModeBand {
-        wavenumber_rad_m: keys.wavenumbers_rad_m(),
-        modes: keys.modes,
-        lattice_start: [uniform(&mut lattice), uniform(&mut lattice)],
-    };
+    let band_rad_m = keys.wavenumbers_rad_m();
+    let lattice_start = [uniform(&mut lattice), uniform(&mut lattice)];
     let mut turns = Vec::with_capacity(keys.modes);
     let uniforms = |n: usize| {
         let mut own = stream(scene.seed, &stage, n as u64);
@@ -42,7 +39,13 @@ pub(super) fn eddies(scene: &Scene, realisation: usize) -> Result<Option<Eddies>
         numbers
     };
     let energy_m3_s2 = |wavenumber_rad_m| spectrum.energy_m3_s2(wavenumber_rad_m);
-    let mut modes = isotropic_modes(&band, energy_m3_s2, uniforms)?;
+    let mut modes = isotropic_modes(
+        band_rad_m,
+        keys.modes,
+        lattice_start,
+        energy_m3_s2,
+        uniforms,
+    )?;
     if keys.decorrelation == EddyDecorrelation::Sweeping {
         // Large eddies carry small ones past a point (Kraichnan 1964, Tennekes 1975).
         let sweeping_m_s = spectrum.variance_m2_s2().sqrt();
@@ -51,12 +54,10 @@ pub(super) fn eddies(scene: &Scene, realisation: usize) -> Result<Option<Eddies>
             mode.frequency_rad_s = turn * sweeping_m_s * (x * x + y * y + z * z).sqrt();
         }
     }
-    let eddies = Eddies::new(modes)?
-        .carried(carrying_m_s(scene, keys)?)?
-        .with_evaluation(match keys.evaluation {
-            EddyEvaluation::Levels => LineEvaluation::Levels,
-            EddyEvaluation::All => LineEvaluation::All,
-        });
+    let mut eddies = Eddies::new(modes)?.carried(carrying_m_s(scene, keys)?)?;
+    if keys.evaluation == EddyEvaluation::All {
+        eddies = eddies.summed_at_each_sample();
+    }
     Ok(Some(match keys.ground {
         EddyGround::Open => eddies,
         EddyGround::Blocked => eddies.blocked(),

@@ -8,7 +8,7 @@ use crate::scene::{Flow, PairDecay, SceneFile, VortexMotion, VortexPair};
 use std::fmt::Write as _;
 use std::sync::Arc;
 use wakescope_les::winds::decay::{self, DecayLaw};
-use wakescope_les::winds::{AlongFlight, Sum, Transport, TransportedPair, Vortex};
+use wakescope_les::winds::{AlongFlight, Transport, TransportedPair, Vortex};
 use wakescope_les::{self as les, Wind};
 
 /// Greatest age of a transported pair, in tau: nothing is left of it then.
@@ -169,7 +169,10 @@ impl ScenePair {
 ///
 /// # Errors
 /// What a wind refuses; a checked scene gives none.
-pub(crate) fn mean_winds(cross_wind_m_s: f64, file: &SceneFile) -> Result<Sum, Error> {
+pub(crate) fn mean_winds(
+    cross_wind_m_s: f64,
+    file: &SceneFile,
+) -> Result<Vec<Box<dyn Wind>>, Error> {
     let scene = &file.content;
     let mut winds: Vec<Box<dyn Wind>> = vec![Box::new(uniform_wind(cross_wind_m_s, 0.0)?)];
     for flow in std::iter::once(&scene.flow).chain(&scene.added_flows) {
@@ -182,7 +185,7 @@ pub(crate) fn mean_winds(cross_wind_m_s: f64, file: &SceneFile) -> Result<Sum, E
             _ => {}
         }
     }
-    Ok(Sum { winds })
+    Ok(winds)
 }
 
 /// The eddies that move a pair, by the time since its release.
