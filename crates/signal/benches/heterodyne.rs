@@ -11,7 +11,6 @@ use num_complex::Complex;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_signal::literal::literal_envelope;
-use wakescope_signal::sampled::SampledPulse;
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
     AccumulatedProducts, Error, GaussianPulse, LineOfSight, NoiseModel, Pulse, Receiver, Record,
@@ -32,7 +31,7 @@ fn chirped() -> Result<Pulse, Error> {
             Complex::from_polar(gaussian.envelope_per_sqrt_s(*t), phase)
         })
         .collect();
-    Ok(SampledPulse::new(&times, &amplitude, gaussian.energy_j())?.into())
+    Pulse::from_envelope(&times, &amplitude, gaussian.energy_j())
 }
 
 fn simulator(

@@ -14,7 +14,6 @@ use std::f64::consts::PI;
 use num_complex::Complex;
 use wakescope_signal::digitise::Digitiser;
 use wakescope_signal::efficiency::LayerEfficiency;
-use wakescope_signal::sampled::SampledPulse;
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
     Error, LineOfSight, Medium, Pulse, RangeFilter, Receiver, Record, SPEED_OF_LIGHT_M_S, Scan,
@@ -47,9 +46,7 @@ fn measured_pulse() -> Result<Pulse, Error> {
             Complex::from_polar(modulus, PI * 2e13 * (t - centroid_s).powi(2))
         })
         .collect();
-    Ok(SampledPulse::new(&time_s, &amplitude, 300e-6)?
-        .centred()
-        .into())
+    Ok(Pulse::from_envelope(&time_s, &amplitude, 300e-6)?.centred())
 }
 
 /// Radial velocity past a vortex of 450 m^2/s at 400 m, on a line that passes its axis

@@ -29,7 +29,7 @@
 //! | module | what is in it |
 //! |---|---|
 //! | `pulse` | [`Pulse`]: [`GaussianPulse`] (7) or sampled; its moments and range weight, and the layers it needs |
-//! | [`sampled`] | [`SampledPulse`](sampled::SampledPulse): any envelope given by samples, joined by a spline |
+//! | `sampled` | [`Pulse::from_envelope`], [`Pulse::from_power`]: any envelope given by samples, joined by a spline |
 //! | `piecewise` | cubic pieces of a sampled envelope |
 //! | `medium` | [`Medium`]: backscatter and extinction by range or height |
 //! | [`aerosol`] | extinction of a visibility; a layer over height |
@@ -78,7 +78,7 @@ mod pulse;
 pub mod receiver;
 mod record;
 mod sample;
-pub mod sampled;
+mod sampled;
 pub mod scan;
 mod shot;
 mod table;

@@ -11,7 +11,6 @@ use num_complex::Complex;
 
 use crate::error::check_positive;
 use crate::piecewise::{Moments, Piecewise};
-use crate::sampled::SampledPulse;
 use crate::{Error, LayerLimits, SPEED_OF_LIGHT_M_S};
 
 /// Half-length of the sum over a Gaussian in units of `sigma` (Frehlich 1997): outside lies
@@ -103,7 +102,7 @@ impl GaussianPulse {
 
 /// A pulse as it leaves the telescope: envelope `f(t)`, of unit energy, and energy.
 ///
-/// Made from a [`GaussianPulse`] or a [`SampledPulse`] by `into()`.
+/// Made from a [`GaussianPulse`] by `into()`, or from samples, as by [`Pulse::from_envelope`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pulse {
     shape: Shape,
@@ -149,27 +148,6 @@ impl From<GaussianPulse> for Pulse {
     }
 }
 
-impl From<SampledPulse> for Pulse {
-    fn from(
-        SampledPulse {
-            envelope,
-            moments,
-            energy_j,
-            real,
-        }: SampledPulse,
-    ) -> Self {
-        Self {
-            energy_j,
-            real,
-            moments,
-            support_s: envelope.support_s(),
-            allowed_s: thickest_layer_s(&envelope, ALLOWED_ENERGY_ERROR),
-            advised_s: thickest_layer_s(&envelope, ADVISED_ENERGY_ERROR),
-            shape: Shape::Sampled(envelope),
-        }
-    }
-}
-
 impl From<&Self> for Pulse {
     fn from(pulse: &Self) -> Self {
         pulse.clone()
@@ -177,6 +155,30 @@ impl From<&Self> for Pulse {
 }
 
 impl Pulse {
+    /// The pulse of an envelope of unit energy.
+    pub(crate) fn sampled(envelope: Piecewise, energy_j: f64, is_real: bool) -> Self {
+        Self {
+            energy_j,
+            real: is_real,
+            moments: envelope.moments(),
+            support_s: envelope.support_s(),
+            allowed_s: thickest_layer_s(&envelope, ALLOWED_ENERGY_ERROR),
+            advised_s: thickest_layer_s(&envelope, ADVISED_ENERGY_ERROR),
+            shape: Shape::Sampled(envelope),
+        }
+    }
+
+    /// The same pulse, moved in time so that the centroid of its power is at time 0: ranges then
+    /// count from its middle, as those of a Gaussian do in any case.
+    #[must_use]
+    pub fn centred(mut self) -> Self {
+        let Shape::Sampled(envelope) = &mut self.shape else {
+            return self;
+        };
+        envelope.shift(-self.moments.mean_s);
+        Self::sampled(envelope.clone(), self.energy_j, self.real)
+    }
+
     /// Energy of the pulse, `E_t` \[J\].
     pub fn energy_j(&self) -> f64 {
         self.energy_j
@@ -389,15 +391,13 @@ mod tests {
     }
 
     /// A rise of 40 ns, a flat top, a long tail.
-    fn skewed() -> SampledPulse {
+    fn skewed() -> Pulse {
         let times: Vec<f64> = (0..400).map(|i| f64::from(i) * 2e-9).collect();
         let power: Vec<f64> = times
             .iter()
             .map(|t| (1.0 - (-(t / 4e-8).powi(2)).exp()) * (-(t / 2.5e-7).powi(3)).exp())
             .collect();
-        SampledPulse::from_power(&times, &power, 1e-4)
-            .unwrap()
-            .centred()
+        Pulse::from_power(&times, &power, 1e-4).unwrap().centred()
     }
 
     /// Table 2's pulse, sampled, with a frequency that rises by `chirp_hz_s`.
@@ -410,11 +410,11 @@ mod tests {
                 Complex::from_polar(modulus, PI * chirp_hz_s * t * t)
             })
             .collect();
-        SampledPulse::new(&times, &amplitude, 1e-4).unwrap().into()
+        Pulse::from_envelope(&times, &amplitude, 1e-4).unwrap()
     }
 
     /// A flat pulse that rises and falls within one step of its samples.
-    fn rectangle(duration_s: f64, step_s: f64) -> SampledPulse {
+    fn rectangle(duration_s: f64, step_s: f64) -> Pulse {
         let half = (0.5 * duration_s / step_s).round() as i32;
         let times: Vec<f64> = (-half - 1..=half)
             .map(|i| (f64::from(i) + 0.5) * step_s)
@@ -422,7 +422,7 @@ mod tests {
         let mut power = vec![1.0; times.len()];
         power[0] = 0.0;
         power[times.len() - 1] = 0.0;
-        SampledPulse::from_power(&times, &power, 1e-4).unwrap()
+        Pulse::from_power(&times, &power, 1e-4).unwrap()
     }
 
     #[test]
@@ -539,7 +539,7 @@ mod tests {
         }
         // A rectangle of T, whose tails make its standard deviation say nothing: |sinc|^2 is
         // half at 0.4429/T.
-        let flat = Pulse::from(rectangle(200e-9, 0.2e-9));
+        let flat = rectangle(200e-9, 0.2e-9);
         // The energy cut off at both ends shortens it.
         assert_relative_eq!(
             flat.spectral_full_width_half_maximum_hz(),
@@ -559,8 +559,8 @@ mod tests {
                 Complex::from_polar(modulus, PI * 1e14 * t * t)
             })
             .collect();
-        let late = SampledPulse::new(&times, &amplitude, 1e-4).unwrap();
-        let found_hz = Pulse::from(late).mean_frequency_hz();
+        let late = Pulse::from_envelope(&times, &amplitude, 1e-4).unwrap();
+        let found_hz = late.mean_frequency_hz();
         assert_relative_eq!(found_hz, 1e14 * 5e-8, max_relative = 1e-4);
         assert!(chirped(1e14).mean_frequency_hz().abs() < 1.0);
     }
@@ -569,12 +569,7 @@ mod tests {
     fn advised_layers_hold_the_energy_of_every_shape() {
         let box_shaped = rectangle(200e-9, 1e-9);
         let short = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(2e-9), 1e-4).unwrap();
-        for pulse in [
-            gaussian().into(),
-            short.into(),
-            skewed().into(),
-            Pulse::from(box_shaped),
-        ] {
+        for pulse in [gaussian().into(), short.into(), skewed(), box_shaped] {
             let thickness_m = pulse.layer_thickness_m(limits(0.0)).unwrap();
             assert!(thickness_m <= pulse.max_layer_thickness_m());
             let layer_s = 2.0 * thickness_m / SPEED_OF_LIGHT_M_S;
@@ -606,7 +601,7 @@ mod tests {
 
     #[test]
     fn width_of_a_shape_is_that_of_the_gaussian_with_its_spread() {
-        let pulse = Pulse::from(skewed());
+        let pulse = skewed();
         let step_s = 1e-10;
         let (first_s, last_s) = pulse.support_s();
         let moment = |power: i32| {

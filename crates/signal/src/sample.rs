@@ -3,7 +3,12 @@
 //! Check: the tests of `heterodyne`; the real current is the baseband at the
 //! intermediate frequency.
 
-use num_complex::Complex;
+use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+
+use ndarray::LinalgScalar;
+use num_complex::{Complex, ComplexFloat};
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, Gamma, StandardNormal};
 
 use crate::Error;
 use crate::noise::NoiseScratch;
@@ -17,161 +22,143 @@ use crate::record::Detector;
 /// The real current is `sqrt(2) Re{(s + n) exp(j 2 pi f_c t)}`, so the mean square of the complex
 /// noise is (13), and the signal-to-noise ratio is (14), too. `White` noise fills `-F_s/2` to
 /// `F_s/2` with the density of the band.
-pub trait Sample: sealed::Received {}
+///
+/// Its methods take types of this crate that are not public, so that no other type can implement it.
+pub trait Sample: Copy + Default + Send + Sync + LinalgScalar + ComplexFloat<Real = f64> {
+    /// Whether samples of this kind hold the band of the receiver.
+    #[doc(hidden)]
+    fn check_band(receiver: &Receiver) -> Result<(), Error>;
 
-impl Sample for f64 {}
-impl Sample for Complex<f64> {}
+    /// The samples of an envelope, without noise.
+    #[doc(hidden)]
+    fn receive(detector: &Detector, envelope_a: &[Complex<f64>], out_a: &mut [Self]);
 
-pub(crate) mod sealed {
-    use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+    /// Adds the noise of one record.
+    #[doc(hidden)]
+    fn add_noise<R: Rng + ?Sized>(
+        from: &Detector,
+        rng: &mut R,
+        scratch: &mut NoiseScratch,
+        out_a: &mut [Self],
+    );
 
-    use rand::{Rng, RngExt};
+    /// Covariance of the samples `m` and `n` without noise, from that of the envelope.
+    #[doc(hidden)]
+    fn covariance_a2(detector: &Detector, m: usize, n: usize, envelope_a2: Complex<f64>) -> Self;
 
-    use ndarray::LinalgScalar;
-    use num_complex::ComplexFloat;
-    use rand_distr::{Distribution, Gamma, StandardNormal};
+    /// Covariance of the noise at each lag below `lags`.
+    #[doc(hidden)]
+    fn noise_covariance_a2(detector: &Detector, lags: usize) -> Vec<f64>;
 
-    use super::{Complex, Detector, Error, NoiseScratch, Receiver};
+    /// The number times a real one.
+    #[doc(hidden)]
+    fn scaled(self, factor: f64) -> Self;
 
-    pub trait Received:
-        Copy + Default + Send + Sync + LinalgScalar + ComplexFloat<Real = f64>
-    {
-        /// Whether samples of this kind hold the band of the receiver.
-        fn check_band(receiver: &Receiver) -> Result<(), Error>;
+    /// A normal number of mean square 1; circular if it is complex.
+    #[doc(hidden)]
+    fn normal<R: Rng + ?Sized>(rng: &mut R) -> Self;
 
-        /// The samples of an envelope, without noise.
-        fn receive(detector: &Detector, envelope_a: &[Complex<f64>], out_a: &mut [Self]);
+    /// Root of the sum of the squares of so many normal numbers.
+    #[doc(hidden)]
+    fn root_of_squares<R: Rng + ?Sized>(numbers: usize, rng: &mut R) -> Self;
 
-        /// Adds the noise of one record.
-        fn add_noise<R: Rng + ?Sized>(
-            from: &Detector,
-            rng: &mut R,
-            scratch: &mut NoiseScratch,
-            out_a: &mut [Self],
-        );
+    /// Real numbers that the sample consists of.
+    #[doc(hidden)]
+    fn for_each_part(&mut self, act: impl FnMut(&mut f64));
+}
 
-        /// Covariance of the samples `m` and `n` without noise, from that of the envelope.
-        fn covariance_a2(
-            detector: &Detector,
-            m: usize,
-            n: usize,
-            envelope_a2: Complex<f64>,
-        ) -> Self;
-
-        /// Covariance of the noise at each lag below `lags`.
-        fn noise_covariance_a2(detector: &Detector, lags: usize) -> Vec<f64>;
-
-        /// The number times a real one.
-        fn scaled(self, factor: f64) -> Self;
-
-        /// A normal number of mean square 1; circular if it is complex.
-        fn normal<R: Rng + ?Sized>(rng: &mut R) -> Self;
-
-        /// Root of the sum of the squares of so many normal numbers.
-        fn root_of_squares<R: Rng + ?Sized>(numbers: usize, rng: &mut R) -> Self;
-
-        /// Real numbers that the sample consists of.
-        fn for_each_part(&mut self, act: impl FnMut(&mut f64));
+impl Sample for f64 {
+    fn check_band(receiver: &Receiver) -> Result<(), Error> {
+        receiver.validate_band()
     }
 
-    impl Received for f64 {
-        fn check_band(receiver: &Receiver) -> Result<(), Error> {
-            receiver.validate_band()
-        }
-
-        fn receive(detector: &Detector, envelope_a: &[Complex<f64>], out_a: &mut [Self]) {
-            for ((out, s), carrier) in out_a.iter_mut().zip(envelope_a).zip(&detector.carrier) {
-                *out = SQRT_2 * (s.re * carrier.re - s.im * carrier.im);
-            }
-        }
-
-        fn add_noise<R: Rng + ?Sized>(
-            from: &Detector,
-            rng: &mut R,
-            scratch: &mut NoiseScratch,
-            out_a: &mut [Self],
-        ) {
-            from.noise.add_to(rng, scratch, out_a);
-        }
-
-        fn covariance_a2(
-            detector: &Detector,
-            m: usize,
-            n: usize,
-            envelope_a2: Complex<f64>,
-        ) -> Self {
-            (envelope_a2 * detector.carrier[m] * detector.carrier[n].conj()).re
-        }
-
-        fn noise_covariance_a2(detector: &Detector, lags: usize) -> Vec<f64> {
-            detector.noise.covariance_a2(lags)
-        }
-
-        fn scaled(self, factor: f64) -> Self {
-            self * factor
-        }
-
-        fn normal<R: Rng + ?Sized>(rng: &mut R) -> Self {
-            rng.sample(StandardNormal)
-        }
-
-        fn root_of_squares<R: Rng + ?Sized>(numbers: usize, rng: &mut R) -> Self {
-            (2.0 * gamma(0.5 * numbers as f64, rng)).sqrt()
-        }
-
-        fn for_each_part(&mut self, mut act: impl FnMut(&mut f64)) {
-            act(self);
+    fn receive(detector: &Detector, envelope_a: &[Complex<f64>], out_a: &mut [Self]) {
+        for ((out, s), carrier) in out_a.iter_mut().zip(envelope_a).zip(&detector.carrier) {
+            *out = SQRT_2 * (s.re * carrier.re - s.im * carrier.im);
         }
     }
 
-    impl Received for Complex<f64> {
-        fn check_band(_: &Receiver) -> Result<(), Error> {
-            Ok(())
-        }
-
-        fn receive(_: &Detector, envelope_a: &[Self], out_a: &mut [Self]) {
-            out_a.copy_from_slice(envelope_a);
-        }
-
-        fn add_noise<R: Rng + ?Sized>(
-            from: &Detector,
-            rng: &mut R,
-            scratch: &mut NoiseScratch,
-            out_a: &mut [Self],
-        ) {
-            from.baseband_noise.add_to(rng, scratch, out_a);
-        }
-
-        fn covariance_a2(_: &Detector, _: usize, _: usize, envelope_a2: Self) -> Self {
-            envelope_a2
-        }
-
-        fn noise_covariance_a2(detector: &Detector, lags: usize) -> Vec<f64> {
-            detector.baseband_noise.covariance_a2(lags)
-        }
-
-        fn scaled(self, factor: f64) -> Self {
-            self * factor
-        }
-
-        fn normal<R: Rng + ?Sized>(rng: &mut R) -> Self {
-            let re: f64 = rng.sample(StandardNormal);
-            let im: f64 = rng.sample(StandardNormal);
-            Self::new(re, im) * FRAC_1_SQRT_2
-        }
-
-        fn root_of_squares<R: Rng + ?Sized>(numbers: usize, rng: &mut R) -> Self {
-            Self::from(gamma(numbers as f64, rng).sqrt())
-        }
-
-        fn for_each_part(&mut self, mut act: impl FnMut(&mut f64)) {
-            act(&mut self.re);
-            act(&mut self.im);
-        }
+    fn add_noise<R: Rng + ?Sized>(
+        from: &Detector,
+        rng: &mut R,
+        scratch: &mut NoiseScratch,
+        out_a: &mut [Self],
+    ) {
+        from.noise.add_to(rng, scratch, out_a);
     }
 
-    /// A gamma-distributed number of a positive shape and scale 1.
-    fn gamma<R: Rng + ?Sized>(shape: f64, rng: &mut R) -> f64 {
-        Gamma::new(shape, 1.0).map_or(f64::NAN, |gamma| gamma.sample(rng))
+    fn covariance_a2(detector: &Detector, m: usize, n: usize, envelope_a2: Complex<f64>) -> Self {
+        (envelope_a2 * detector.carrier[m] * detector.carrier[n].conj()).re
     }
+
+    fn noise_covariance_a2(detector: &Detector, lags: usize) -> Vec<f64> {
+        detector.noise.covariance_a2(lags)
+    }
+
+    fn scaled(self, factor: f64) -> Self {
+        self * factor
+    }
+
+    fn normal<R: Rng + ?Sized>(rng: &mut R) -> Self {
+        rng.sample(StandardNormal)
+    }
+
+    fn root_of_squares<R: Rng + ?Sized>(numbers: usize, rng: &mut R) -> Self {
+        (2.0 * gamma(0.5 * numbers as f64, rng)).sqrt()
+    }
+
+    fn for_each_part(&mut self, mut act: impl FnMut(&mut f64)) {
+        act(self);
+    }
+}
+
+impl Sample for Complex<f64> {
+    fn check_band(_: &Receiver) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn receive(_: &Detector, envelope_a: &[Self], out_a: &mut [Self]) {
+        out_a.copy_from_slice(envelope_a);
+    }
+
+    fn add_noise<R: Rng + ?Sized>(
+        from: &Detector,
+        rng: &mut R,
+        scratch: &mut NoiseScratch,
+        out_a: &mut [Self],
+    ) {
+        from.baseband_noise.add_to(rng, scratch, out_a);
+    }
+
+    fn covariance_a2(_: &Detector, _: usize, _: usize, envelope_a2: Self) -> Self {
+        envelope_a2
+    }
+
+    fn noise_covariance_a2(detector: &Detector, lags: usize) -> Vec<f64> {
+        detector.baseband_noise.covariance_a2(lags)
+    }
+
+    fn scaled(self, factor: f64) -> Self {
+        self * factor
+    }
+
+    fn normal<R: Rng + ?Sized>(rng: &mut R) -> Self {
+        let re: f64 = rng.sample(StandardNormal);
+        let im: f64 = rng.sample(StandardNormal);
+        Self::new(re, im) * FRAC_1_SQRT_2
+    }
+
+    fn root_of_squares<R: Rng + ?Sized>(numbers: usize, rng: &mut R) -> Self {
+        Self::from(gamma(numbers as f64, rng).sqrt())
+    }
+
+    fn for_each_part(&mut self, mut act: impl FnMut(&mut f64)) {
+        act(&mut self.re);
+        act(&mut self.im);
+    }
+}
+
+/// A gamma-distributed number of a positive shape and scale 1.
+fn gamma<R: Rng + ?Sized>(shape: f64, rng: &mut R) -> f64 {
+    Gamma::new(shape, 1.0).map_or(f64::NAN, |gamma| gamma.sample(rng))
 }

@@ -9,36 +9,32 @@
 use num_complex::Complex;
 
 use crate::Error;
+use crate::Pulse;
 use crate::error::{check, check_amounts, check_increasing, check_length, check_positive};
-use crate::piecewise::{Moments, Piecewise};
+use crate::piecewise::Piecewise;
 
 /// Energy cut off at each end, as a fraction of the whole.
 const CUT_ENERGY: f64 = 0.5e-7;
 
-/// A transmitted pulse of any sampled shape.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SampledPulse {
-    pub(crate) envelope: Piecewise,
-    pub(crate) moments: Moments,
-    pub(crate) energy_j: f64,
-    /// Whether the envelope has no imaginary part.
-    pub(crate) real: bool,
-}
-
-impl SampledPulse {
+/// Pulses of any sampled shape.
+impl Pulse {
     /// A pulse from its complex envelope at increasing times \[s\]; zero before the first and
     /// after the last sample. The unit of the amplitude does not matter: the envelope is scaled
     /// to unit energy.
     ///
     /// Time 0 is the moment from which ranges are counted, `R = c t/2`; see
-    /// [`SampledPulse::centred`]. A positive frequency of the envelope, `exp(+j 2 pi nu t)`, raises
+    /// [`Pulse::centred`]. A positive frequency of the envelope, `exp(+j 2 pi nu t)`, raises
     /// the intermediate frequency.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for fewer than two samples or an energy that is not positive;
     /// [`Error::LengthMismatch`]; [`Error::ElementOutOfRange`] for a value that is not finite,
     /// times that do not increase, or an amplitude that is zero everywhere.
-    pub fn new(time_s: &[f64], amplitude: &[Complex<f64>], energy_j: f64) -> Result<Self, Error> {
+    pub fn from_envelope(
+        time_s: &[f64],
+        amplitude: &[Complex<f64>],
+        energy_j: f64,
+    ) -> Result<Self, Error> {
         check_positive("energy_j", energy_j)?;
         let largest = check_samples(time_s, amplitude)?;
         // Scaled before squaring, so that amplitudes of any size have an energy.
@@ -53,31 +49,26 @@ impl SampledPulse {
             |e| e > 0.0,
         )?;
         envelope.scale(energy.sqrt().recip());
-        let moments = envelope.moments();
-        Ok(Self {
-            envelope,
-            moments,
-            energy_j,
-            real: amplitude.iter().all(|a| a.im == 0.0),
-        })
+        let is_real = amplitude.iter().all(|a| a.im == 0.0);
+        Ok(Self::sampled(envelope, energy_j, is_real))
     }
 
     /// A pulse from its power at increasing times \[s\], as a photodiode measures it, without
     /// phase; any unit.
     ///
     /// # Errors
-    /// As [`SampledPulse::new`]; [`Error::ElementOutOfRange`] for a negative power.
+    /// As [`Pulse::from_envelope`]; [`Error::ElementOutOfRange`] for a negative power.
     pub fn from_power(time_s: &[f64], power: &[f64], energy_j: f64) -> Result<Self, Error> {
         check_length("power", power.len(), time_s.len())?;
         check_amounts("power", power)?;
         let amplitude: Vec<_> = power.iter().map(|p| Complex::new(p.sqrt(), 0.0)).collect();
-        Self::new(time_s, &amplitude, energy_j)
+        Self::from_envelope(time_s, &amplitude, energy_j)
     }
 
     /// A pulse from its power, any unit, and its phase \[rad\] at increasing times \[s\].
     ///
     /// # Errors
-    /// As [`SampledPulse::from_power`]; [`Error::ElementOutOfRange`] for a phase that is not finite.
+    /// As [`Pulse::from_power`]; [`Error::ElementOutOfRange`] for a phase that is not finite.
     pub fn from_power_and_phase(
         time_s: &[f64],
         power: &[f64],
@@ -99,16 +90,7 @@ impl SampledPulse {
             }
             amplitude.push(Complex::from_polar(power.sqrt(), *phase_rad));
         }
-        Self::new(time_s, &amplitude, energy_j)
-    }
-
-    /// The same pulse, moved in time so that the centroid of its power is at time 0: ranges then
-    /// count from its middle, as for a Gaussian.
-    #[must_use]
-    pub fn centred(mut self) -> Self {
-        self.envelope.shift(-self.moments.mean_s);
-        self.moments = self.envelope.moments();
-        self
+        Self::from_envelope(time_s, &amplitude, energy_j)
     }
 }
 
@@ -161,11 +143,13 @@ mod tests {
             .iter()
             .map(|t| Complex::new(3e4 * gaussian().envelope_per_sqrt_s(*t), 0.0))
             .collect();
-        let pulse = SampledPulse::new(times, &amplitude, 150e-6).unwrap();
+        let pulse = Pulse::from_envelope(times, &amplitude, 150e-6).unwrap();
         let peak = gaussian().envelope_per_sqrt_s(0.0);
         (0..2000)
             .map(|i| (f64::from(i) - 1000.3) * 0.4e-9)
-            .map(|t| (pulse.envelope.value(t) - gaussian().envelope_per_sqrt_s(t)).norm() / peak)
+            .map(|t| {
+                (pulse.envelope_per_sqrt_s(t) - gaussian().envelope_per_sqrt_s(t)).norm() / peak
+            })
             .fold(0.0, f64::max)
     }
 
@@ -193,16 +177,12 @@ mod tests {
             .map(|t| gaussian().intensity_per_s(*t))
             .collect();
         let late: Vec<f64> = times.iter().map(|t| t + 3e-6).collect();
-        let pulse = SampledPulse::from_power(&late, &power, 1e-4).unwrap();
-        assert_relative_eq!(pulse.moments.mean_s, 3e-6, max_relative = 1e-9);
+        let pulse = Pulse::from_power(&late, &power, 1e-4).unwrap();
+        assert_relative_eq!(pulse.mean_time_s(), 3e-6, max_relative = 1e-9);
         let centred = pulse.centred();
-        assert!(centred.moments.mean_s.abs() < 1e-15);
-        assert_relative_eq!(
-            centred.moments.square_s2,
-            0.5 * gaussian().sigma_s().powi(2),
-            max_relative = 1e-5
-        );
-        let (first, last) = centred.envelope.support_s();
+        assert!(centred.mean_time_s().abs() < 1e-15);
+        assert_relative_eq!(centred.sigma_s(), gaussian().sigma_s(), max_relative = 5e-6);
+        let (first, last) = centred.support_s();
         assert!(first < -3.7 * gaussian().sigma_s() && last > 3.7 * gaussian().sigma_s());
         assert!(first > -4.0 * gaussian().sigma_s() && last < 4.0 * gaussian().sigma_s());
     }
@@ -215,11 +195,11 @@ mod tests {
                 .iter()
                 .map(|t| Complex::new(size * (-0.5 * (t / 1e-7).powi(2)).exp(), 0.0))
                 .collect();
-            SampledPulse::new(&times, &amplitude, 1e-4).unwrap()
+            Pulse::from_envelope(&times, &amplitude, 1e-4).unwrap()
         };
         for size in [1e-200, 1e200] {
-            let found = of_size(size).envelope.value(3e-8);
-            let expected = of_size(1.0).envelope.value(3e-8);
+            let found = of_size(size).envelope_per_sqrt_s(3e-8);
+            let expected = of_size(1.0).envelope_per_sqrt_s(3e-8);
             assert_relative_eq!(found.re, expected.re, max_relative = 1e-13);
         }
     }
@@ -228,7 +208,7 @@ mod tests {
     fn samples_that_are_no_pulse_are_refused() {
         let one = Complex::new(1.0, 0.0);
         let make = |times: &[f64], values: &[Complex<f64>]| {
-            SampledPulse::new(times, values, 1e-4).map(|_| ())
+            Pulse::from_envelope(times, values, 1e-4).map(|_| ())
         };
         assert!(matches!(
             make(&[0.0], &[one]),
@@ -261,7 +241,7 @@ mod tests {
                 ..
             })
         ));
-        let negative = SampledPulse::from_power(&[0.0, 1e-8], &[1.0, -1.0], 1e-4);
+        let negative = Pulse::from_power(&[0.0, 1e-8], &[1.0, -1.0], 1e-4);
         assert!(matches!(
             negative,
             Err(Error::ElementOutOfRange {

@@ -26,8 +26,12 @@ pub struct FrontEnd {
     /// Power `P_s` at which the current has fallen to half of `S P`, `I = S P/(1 + P/P_s)` \[W\];
     /// `inf` for none.
     pub saturation_w: f64,
-    /// How fast the detector is.
-    pub response: Butterworth,
+    /// Number of poles `n` of the detector, a low pass of the Butterworth kind,
+    /// `|H|^2 = 1/(1 + (f/f_3dB)^(2 n))`.
+    pub poles: u32,
+    /// Frequency `f_3dB` at which its power has fallen to half \[Hz\]; `inf` for a detector that is
+    /// fast enough.
+    pub half_power_hz: f64,
     /// Noise of the converter's rounding over the density of all noises before it,
     /// [`super::Converter::rounding`]. It counts in the signal-to-noise ratio alone: the samples
     /// have it from the converter itself.
@@ -41,26 +45,6 @@ pub struct FrontEnd {
     pub reflection: f64,
 }
 
-/// A low pass of the Butterworth kind, `|H|^2 = 1/(1 + (f/f_3dB)^(2 n))`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Butterworth {
-    /// Number of poles `n`.
-    pub order: u32,
-    /// Frequency at which the power has fallen to half \[Hz\]; `inf` for a detector that
-    /// is fast enough.
-    pub half_power_hz: f64,
-}
-
-impl Butterworth {
-    /// `|H(f)|^2`.
-    pub fn power_at(&self, frequency_hz: f64) -> f64 {
-        1.0 / (1.0
-            + (frequency_hz / self.half_power_hz)
-                .powi(2)
-                .powi(self.order as i32))
-    }
-}
-
 impl FrontEnd {
     /// Only shot noise.
     pub const IDEAL: Self = Self {
@@ -71,15 +55,21 @@ impl FrontEnd {
         intensity_noise_db_hz: f64::NEG_INFINITY,
         rejection_db: 0.0,
         saturation_w: f64::INFINITY,
-        response: Butterworth {
-            order: 1,
-            half_power_hz: f64::INFINITY,
-        },
+        poles: 1,
+        half_power_hz: f64::INFINITY,
         rounding_noise: 0.0,
         clipping_noise: 0.0,
         linewidth_hz: 0.0,
         reflection: 0.0,
     };
+
+    /// `|H(f)|^2` of the detector.
+    pub fn power_response_at(&self, frequency_hz: f64) -> f64 {
+        1.0 / (1.0
+            + (frequency_hz / self.half_power_hz)
+                .powi(2)
+                .powi(self.poles as i32))
+    }
 
     pub(super) fn validate(&self) -> Result<(), Error> {
         let finite = [
@@ -98,8 +88,8 @@ impl FrontEnd {
             ("load_ohm", self.load_ohm),
             ("load_temperature_k", self.load_temperature_k),
             ("saturation_w", self.saturation_w),
-            ("half_power_hz", self.response.half_power_hz),
-            ("order", f64::from(self.response.order)),
+            ("half_power_hz", self.half_power_hz),
+            ("poles", f64::from(self.poles)),
         ];
         for (field, value) in above {
             if value.is_nan() || value <= 0.0 {

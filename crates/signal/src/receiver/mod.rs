@@ -19,7 +19,7 @@ mod penalties;
 pub mod phase_noise;
 
 pub use converter::{Clipping, Converter};
-pub use front_end::{Butterworth, FrontEnd};
+pub use front_end::FrontEnd;
 pub use penalties::{NoiseDensities, Penalties};
 
 use std::f64::consts::PI;

@@ -77,8 +77,7 @@ impl Receiver {
     /// Power gain of the beat against an unsaturated and fast detector: `|H(f_c)|^2 (dI/dP / S)^2`.
     pub(super) fn beat_gain(&self) -> f64 {
         self.front_end
-            .response
-            .power_at(self.intermediate_frequency_hz)
+            .power_response_at(self.intermediate_frequency_hz)
             / self.drive().powi(4)
     }
 
@@ -94,7 +93,7 @@ impl Receiver {
             amplifier_a2_hz: front.amplifier_noise_a_rthz.powi(2) + thermal,
             dark_a2_hz: 2.0 * ELEMENTARY_CHARGE_C * front.dark_current_a,
             intensity_a2_hz: current_a * current_a * intensity / self.drive().powi(4),
-            response: front.response.power_at(self.intermediate_frequency_hz),
+            response: front.power_response_at(self.intermediate_frequency_hz),
         }
     }
 

@@ -104,11 +104,7 @@ fn layers_in_a_gradient_miss_the_closed_form_fraction_of_the_power() {
 
 #[test]
 fn expected_covariance_is_that_of_the_simulators_own_responses() {
-    for pulse in [
-        gaussian(200e-9).into(),
-        chirped(200e-9, 1e14),
-        Pulse::from(skewed()),
-    ] {
+    for pulse in [gaussian(200e-9).into(), chirped(200e-9, 1e14), skewed()] {
         let simulator = window(pulse.clone());
         let air = line(300.0, 560.0, STEP_M, |r| {
             if (430.0..432.0).contains(&r) {

@@ -5,7 +5,6 @@ use std::f64::consts::PI;
 use approx::assert_relative_eq;
 use num_complex::Complex;
 use wakescope_signal::literal::literal_envelope;
-use wakescope_signal::sampled::SampledPulse;
 use wakescope_signal::{NoiseModel, Pulse, RangeFilter, Scratch};
 
 use crate::setup::{
@@ -21,13 +20,13 @@ fn shapes() -> Vec<Pulse> {
         .iter()
         .map(|t| (t / 5e-8) * (-t / 8e-8).exp())
         .collect();
-    let tail = SampledPulse::from_power(&times, &tail, 1e-4).unwrap();
+    let tail = Pulse::from_power(&times, &tail, 1e-4).unwrap();
     vec![
         chirped(200e-9, 1.5e14),
-        tail.clone().centred().into(),
-        skewed().into(),
-        rectangle(200e-9, 4e-9).into(),
-        tail.into(),
+        tail.clone().centred(),
+        skewed(),
+        rectangle(200e-9, 4e-9),
+        tail,
     ]
 }
 
@@ -94,7 +93,7 @@ fn a_sampled_gaussian_gives_the_records_of_the_gaussian() {
         .iter()
         .map(|t| 7.0 * gaussian(200e-9).intensity_per_s(*t))
         .collect();
-    let sampled = SampledPulse::from_power(&times, &power, 150e-6).unwrap();
+    let sampled = Pulse::from_power(&times, &power, 150e-6).unwrap();
     let line = line(250.0, 600.0, STEP_M, |r| 0.1 * (r - 400.0));
     let speckle = normal_speckle(line.layers(), 8);
     let envelope = |pulse: Pulse| {
@@ -105,7 +104,7 @@ fn a_sampled_gaussian_gives_the_records_of_the_gaussian() {
             .unwrap();
         out
     };
-    let (a, b) = (envelope(sampled.into()), envelope(gaussian(200e-9).into()));
+    let (a, b) = (envelope(sampled), envelope(gaussian(200e-9).into()));
     let largest = b.iter().map(|s| s.norm()).fold(0.0, f64::max);
     // The amplitude of a Gaussian is cut at 1e-3 of its peak.
     assert!(
@@ -176,7 +175,7 @@ fn a_pulse_above_its_nominal_frequency_raises_that_of_the_return() {
     let turning =
         |t: &f64| Complex::from_polar(gaussian(200e-9).envelope_per_sqrt_s(*t), 2.0 * PI * 5e6 * t);
     let amplitude: Vec<_> = times.iter().map(turning).collect();
-    let pulse = Pulse::from(SampledPulse::new(&times, &amplitude, 1e-4).unwrap());
+    let pulse = Pulse::from_envelope(&times, &amplitude, 1e-4).unwrap();
     assert_relative_eq!(pulse.mean_frequency_hz(), 5e6, max_relative = 1e-6);
     let simulator = simulator(pulse, NoiseModel::None, 400.0, 2);
     let covariance = simulator

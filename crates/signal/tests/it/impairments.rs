@@ -10,8 +10,7 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_signal::digitise::Digitiser;
 use wakescope_signal::receiver::phase_noise::mean_frequency_sd_m_s;
-use wakescope_signal::receiver::{Butterworth, Converter, FrontEnd};
-use wakescope_signal::sampled::SampledPulse;
+use wakescope_signal::receiver::{Converter, FrontEnd};
 use wakescope_signal::{
     LineOfSight, NoiseModel, Pulse, Receiver, Record, Scratch, Shot, Simulator,
 };
@@ -27,10 +26,8 @@ fn real(noise: NoiseModel) -> Receiver {
         intensity_noise_db_hz: -150.0,
         rejection_db: 5.0,
         saturation_w: 6e-3,
-        response: Butterworth {
-            order: 2,
-            half_power_hz: 90e6,
-        },
+        poles: 2,
+        half_power_hz: 90e6,
         ..FrontEnd::IDEAL
     };
     Receiver {
@@ -178,9 +175,7 @@ fn flat() -> Pulse {
         .iter()
         .map(|t| f64::from(u8::from(t.abs() < 0.61e-6)))
         .collect();
-    SampledPulse::from_power(&times, &power, 150e-6)
-        .unwrap()
-        .into()
+    Pulse::from_power(&times, &power, 150e-6).unwrap()
 }
 
 /// One layer at this range that returns light, and nothing else.

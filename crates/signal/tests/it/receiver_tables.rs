@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::receiver::phase_noise::{mean_frequency_sd_m_s, peak_variance_factor};
-use wakescope_signal::receiver::{Butterworth, Clipping, Converter, FrontEnd};
+use wakescope_signal::receiver::{Clipping, Converter, FrontEnd};
 use wakescope_signal::{Error, GaussianPulse, Pulse, PulseDuration, Receiver, SPEED_OF_LIGHT_M_S};
 
 /// The rows of a stored table.
@@ -177,16 +177,17 @@ fn the_poles_of_the_detector_cost_what_is_stored() {
         against_shot,
     ] in rows::<7>("band_response")
     {
-        let response = Butterworth {
-            order: order as u32,
+        let detector = FrontEnd {
+            poles: order as u32,
             half_power_hz,
+            ..FrontEnd::IDEAL
         };
-        close(10.0 * response.power_at(frequency_hz).log10(), signal_db);
+        let power = detector.power_response_at(frequency_hz);
+        close(10.0 * power.log10(), signal_db);
         let shot = with(FrontEnd::IDEAL).noise_density_a2_hz();
         let front_end = FrontEnd {
-            response,
             amplifier_noise_a_rthz: (over_shot * shot).sqrt(),
-            ..FrontEnd::IDEAL
+            ..detector
         };
         let found = Receiver {
             intermediate_frequency_hz: frequency_hz,

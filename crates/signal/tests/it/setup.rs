@@ -4,7 +4,6 @@ use num_complex::Complex;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wakescope_signal::sampled::SampledPulse;
 use wakescope_signal::{
     GaussianPulse, LayerLimits, LineOfSight, NoiseModel, Pulse, PulseDuration, Receiver, Record,
     Scratch, Simulator,
@@ -38,7 +37,7 @@ pub(crate) fn gaussian(width_s: f64) -> GaussianPulse {
 }
 
 /// A pulse with a rise of 40 ns, a long tail and a phase that is no chirp, about its centroid.
-pub(crate) fn skewed() -> SampledPulse {
+pub(crate) fn skewed() -> Pulse {
     let times: Vec<f64> = (0..400).map(|i| f64::from(i) * 2e-9).collect();
     let amplitude: Vec<Complex<f64>> = times
         .iter()
@@ -49,7 +48,7 @@ pub(crate) fn skewed() -> SampledPulse {
             )
         })
         .collect();
-    SampledPulse::new(&times, &amplitude, 150e-6)
+    Pulse::from_envelope(&times, &amplitude, 150e-6)
         .unwrap()
         .centred()
 }
@@ -67,13 +66,11 @@ pub(crate) fn chirped(width_s: f64, chirp_hz_s: f64) -> Pulse {
             Complex::from_polar(shape.envelope_per_sqrt_s(*t), phase)
         })
         .collect();
-    SampledPulse::new(&times, &amplitude, shape.energy_j())
-        .unwrap()
-        .into()
+    Pulse::from_envelope(&times, &amplitude, shape.energy_j()).unwrap()
 }
 
 /// A flat pulse about time 0 that rises and falls within one step of its samples.
-pub(crate) fn rectangle(duration_s: f64, step_s: f64) -> SampledPulse {
+pub(crate) fn rectangle(duration_s: f64, step_s: f64) -> Pulse {
     let half = (0.5 * duration_s / step_s).round() as i32;
     let times: Vec<f64> = (-half - 1..=half)
         .map(|i| (f64::from(i) + 0.5) * step_s)
@@ -81,7 +78,7 @@ pub(crate) fn rectangle(duration_s: f64, step_s: f64) -> SampledPulse {
     let mut power = vec![1.0; times.len()];
     power[0] = 0.0;
     power[times.len() - 1] = 0.0;
-    SampledPulse::from_power(&times, &power, 150e-6).unwrap()
+    Pulse::from_power(&times, &power, 150e-6).unwrap()
 }
 
 /// Records that begin when the light sent at time 0 comes back from `first_m`.

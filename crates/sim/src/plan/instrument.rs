@@ -219,10 +219,8 @@ fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
         intensity_noise_db_hz: words.intensity_noise_db_hz,
         rejection_db: words.rejection_db,
         saturation_w: words.saturation_w,
-        response: signal::receiver::Butterworth {
-            order: words.poles,
-            half_power_hz: words.half_power_hz,
-        },
+        poles: words.poles,
+        half_power_hz: words.half_power_hz,
         rounding_noise: converter.map_or(0.0, |converter| converter.rounding()),
         clipping_noise: converter.map_or(0.0, |converter| converter.clipping_noise()),
         linewidth_hz: scene.laser.linewidth_hz,

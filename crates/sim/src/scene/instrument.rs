@@ -6,8 +6,7 @@ use super::Scene;
 use crate::keys::{ABOVE_ZERO_OR_INF, Checker, Number, ZERO_OR_MORE, keys};
 use wakescope_optics::RadiusDefinition;
 use wakescope_optics::plan::Receiver as ReceiverPath;
-use wakescope_signal::sampled::SampledPulse;
-use wakescope_signal::{GaussianPulse, NoiseModel, PulseDuration};
+use wakescope_signal::{GaussianPulse, NoiseModel, Pulse as TransmittedPulse, PulseDuration};
 
 keys! {
     /// The laser source.
@@ -192,7 +191,7 @@ impl Pulse {
     ///
     /// # Errors
     /// Fails if the samples of a sampled pulse are no pulse.
-    pub(crate) fn simulated(&self) -> Result<wakescope_signal::Pulse, wakescope_signal::Error> {
+    pub(crate) fn simulated(&self) -> Result<TransmittedPulse, wakescope_signal::Error> {
         match &self.shape {
             PulseShape::Gaussian(shape) => {
                 Ok(GaussianPulse::new(shape.duration(), self.energy_j)?.into())
@@ -219,11 +218,11 @@ impl PulseShape {
 
 impl SampledShape {
     /// The pulse of these samples with an energy, J.
-    fn simulated(&self, energy_j: f64) -> Result<wakescope_signal::Pulse, wakescope_signal::Error> {
+    fn simulated(&self, energy_j: f64) -> Result<TransmittedPulse, wakescope_signal::Error> {
         let sampled = if self.phase_rad.is_empty() {
-            SampledPulse::from_power(&self.time_s, &self.power, energy_j)?
+            TransmittedPulse::from_power(&self.time_s, &self.power, energy_j)?
         } else {
-            SampledPulse::from_power_and_phase(
+            TransmittedPulse::from_power_and_phase(
                 &self.time_s,
                 &self.power,
                 &self.phase_rad,
@@ -231,9 +230,9 @@ impl SampledShape {
             )?
         };
         Ok(if self.centred {
-            sampled.centred().into()
+            sampled.centred()
         } else {
-            sampled.into()
+            sampled
         })
     }
 }
