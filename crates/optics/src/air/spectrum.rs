@@ -26,40 +26,30 @@ pub trait Spectrum: Debug + Send + Sync {
     fn inner_wavenumber_rad_m(&self) -> f64;
 }
 
-/// Outer and inner scale of a spectrum.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scales {
-    /// Outer scale L0 \[m\], with kappa_0 = 1/L0 as in (17); infinity for none.
-    pub outer_scale_m: f64,
-    /// Inner scale l0 \[m\]; 0 for none.
-    pub inner_scale_m: f64,
-}
-
-impl Scales {
-    /// kappa_0, and kappa_m = `cut`/l0, after the checks that every spectrum needs \[rad/m\].
-    fn wavenumbers_rad_m(self, cut: f64) -> Result<(f64, f64), Error> {
-        let Self {
-            outer_scale_m,
-            inner_scale_m,
-        } = self;
-        within(
-            "outer_scale_m",
-            outer_scale_m,
-            outer_scale_m > 0.0,
-            "a number above 0, infinity for none",
-        )?;
-        not_negative("inner_scale_m", inner_scale_m)?;
-        let outer_rad_m = 1.0 / outer_scale_m;
-        let inner_rad_m = cut / inner_scale_m;
-        let apart = outer_rad_m < inner_rad_m && outer_scale_m > inner_scale_m;
-        within(
-            "inner_scale_m",
-            inner_scale_m,
-            apart,
-            "below outer_scale_m, with kappa_m above kappa_0",
-        )?;
-        Ok((outer_rad_m, inner_rad_m))
-    }
+/// kappa_0, and kappa_m = `cut`/l0, of a spectrum with an outer scale L0 (infinity for none) and an
+/// inner scale l0 (0 for none), after the checks that every spectrum needs \[rad/m\].
+fn wavenumbers_rad_m(
+    outer_scale_m: f64,
+    inner_scale_m: f64,
+    cut: f64,
+) -> Result<(f64, f64), Error> {
+    within(
+        "outer_scale_m",
+        outer_scale_m,
+        outer_scale_m > 0.0,
+        "a number above 0, infinity for none",
+    )?;
+    not_negative("inner_scale_m", inner_scale_m)?;
+    let outer_rad_m = 1.0 / outer_scale_m;
+    let inner_rad_m = cut / inner_scale_m;
+    let apart = outer_rad_m < inner_rad_m && outer_scale_m > inner_scale_m;
+    within(
+        "inner_scale_m",
+        inner_scale_m,
+        apart,
+        "below outer_scale_m, with kappa_m above kappa_0",
+    )?;
+    Ok((outer_rad_m, inner_rad_m))
 }
 
 /// (17): constant exp(-kappa^2/kappa_m^2) / (kappa^2 + kappa_0^2)^(11/6), kappa_m = 5.92/l0.
@@ -73,13 +63,14 @@ pub struct VonKarman {
 }
 
 impl VonKarman {
-    /// Spectrum with these scales; `constant` is 0.033 as printed ([`CHAPTER_CONSTANT`]), or
+    /// Spectrum with an outer scale L0 \[m\], kappa_0 = 1/L0, infinity for none, and an inner scale
+    /// l0 \[m\], 0 for none; `constant` is 0.033 as printed ([`CHAPTER_CONSTANT`]), or
     /// [`EXACT_CONSTANT`].
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for L0 <= 0, l0 < 0, not a number, or kappa_0 >= kappa_m.
-    pub fn new(scales: Scales, constant: f64) -> Result<Self, Error> {
-        let (outer_rad_m, inner_rad_m) = scales.wavenumbers_rad_m(5.92)?;
+    pub fn new(outer_scale_m: f64, inner_scale_m: f64, constant: f64) -> Result<Self, Error> {
+        let (outer_rad_m, inner_rad_m) = wavenumbers_rad_m(outer_scale_m, inner_scale_m, 5.92)?;
         positive("constant", constant)?;
         Ok(Self {
             constant,
@@ -131,20 +122,19 @@ pub struct HillAndrews {
 }
 
 impl HillAndrews {
-    /// Spectrum with these scales; the inner one is above 0.
+    /// Spectrum with an outer scale \[m\], infinity for none, and an inner scale above 0 \[m\].
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for L0 <= 0, l0 <= 0, not a number, or kappa_0 >= 3.3/l0.
-    pub fn new(scales: Scales) -> Result<Self, Error> {
-        let l0_m = scales.inner_scale_m;
+    pub fn new(outer_scale_m: f64, inner_scale_m: f64) -> Result<Self, Error> {
         let allowed = "a finite number above 0: the bump of this spectrum is at the inner scale";
         within(
             "inner_scale_m",
-            l0_m,
-            l0_m.is_finite() && l0_m > 0.0,
+            inner_scale_m,
+            inner_scale_m.is_finite() && inner_scale_m > 0.0,
             allowed,
         )?;
-        let (outer_rad_m, inner_rad_m) = scales.wavenumbers_rad_m(3.3)?;
+        let (outer_rad_m, inner_rad_m) = wavenumbers_rad_m(outer_scale_m, inner_scale_m, 3.3)?;
         Ok(Self {
             outer_rad_m,
             inner_rad_m,
@@ -171,13 +161,6 @@ impl Spectrum for HillAndrews {
 mod tests {
     use super::*;
 
-    fn scales(outer_scale_m: f64, inner_scale_m: f64) -> Scales {
-        Scales {
-            outer_scale_m,
-            inner_scale_m,
-        }
-    }
-
     #[test]
     fn exact_constant_is_the_gamma_function_expression() {
         let exact = libm::tgamma(8.0 / 3.0) * (std::f64::consts::PI / 3.0).sin()
@@ -190,15 +173,15 @@ mod tests {
         let k = 30.0;
         let kolmogorov = VonKarman::kolmogorov().density_per_cn2(k);
         assert!((kolmogorov / (EXACT_CONSTANT * k.powf(-11.0 / 3.0)) - 1.0).abs() < 1e-12);
-        let hill = HillAndrews::new(scales(f64::INFINITY, 1e-6)).unwrap();
+        let hill = HillAndrews::new(f64::INFINITY, 1e-6).unwrap();
         assert!((hill.density_per_cn2(k) / kolmogorov - 1.0).abs() < 1e-4);
-        let without_outer = VonKarman::new(scales(f64::INFINITY, 1e-6), EXACT_CONSTANT).unwrap();
+        let without_outer = VonKarman::new(f64::INFINITY, 1e-6, EXACT_CONSTANT).unwrap();
         assert!((without_outer.density_per_cn2(k) / kolmogorov - 1.0).abs() < 1e-9);
     }
 
     #[test]
     fn scales_that_cross_or_are_no_numbers_are_refused() {
-        let new = |outer, inner| VonKarman::new(scales(outer, inner), 0.033);
+        let new = |outer, inner| VonKarman::new(outer, inner, 0.033);
         assert_eq!(
             new(f64::INFINITY, 0.0).unwrap().outer_wavenumber_rad_m(),
             0.0
@@ -210,7 +193,7 @@ mod tests {
         for (outer, inner) in [(1.0, -0.1), (1.0, f64::NAN), (0.01, 0.02)] {
             assert!(named(new(outer, inner), "inner_scale_m"), "{outer} {inner}");
         }
-        let hill = HillAndrews::new(scales(1.0, 0.0));
+        let hill = HillAndrews::new(1.0, 0.0);
         assert!(matches!(
             hill,
             Err(Error::OutOfRange {

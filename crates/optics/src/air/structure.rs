@@ -148,7 +148,7 @@ impl StructureTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::air::spectrum::{EXACT_CONSTANT, Scales, VonKarman};
+    use crate::air::spectrum::{EXACT_CONSTANT, VonKarman};
 
     #[test]
     fn kolmogorov_gives_the_five_thirds_law() {
@@ -166,14 +166,10 @@ mod tests {
 
     #[test]
     fn table_follows_the_quadrature() {
-        let scales = Scales {
-            outer_scale_m: 0.05,
-            inner_scale_m: 0.004,
-        };
         for spectrum in [
             VonKarman::table2(),
             VonKarman::kolmogorov(),
-            VonKarman::new(scales, 0.033).unwrap(),
+            VonKarman::new(0.05, 0.004, 0.033).unwrap(),
         ] {
             let table = StructureTable::new(&spectrum);
             for i in 0..60 {

@@ -5,7 +5,7 @@
 //! Screens look right and the monostatic efficiency hardly changes; the bistatic efficiency falls
 //! by several standard errors.
 
-use crate::air::{Scales, StructureTable};
+use crate::air::StructureTable;
 use crate::monte_carlo::EfficiencyEstimate;
 use crate::{Error, Grid, Layers, Misalignment, MonteCarlo, Stop, VonKarman, theory};
 use std::ops::ControlFlow;
@@ -40,12 +40,8 @@ fn bistatic_test_passes_and_finds_a_wrong_sign_of_the_frequency_shift() {
     // A narrow grid, whose coarse frequencies make the mistake large, and short steps.
     let mut run = MonteCarlo::table2(1e-14, 20).expect("a valid set-up");
     run.grid = Grid::square(128, 4e-3).expect("a valid set-up");
-    let scales = Scales {
-        outer_scale_m: f64::INFINITY,
-        inner_scale_m: 0.01,
-    };
-    run.turbulence.spectrum =
-        std::sync::Arc::new(VonKarman::new(scales, 0.033).expect("a valid set-up"));
+    let spectrum = VonKarman::new(f64::INFINITY, 0.01, 0.033);
+    run.turbulence.spectrum = std::sync::Arc::new(spectrum.expect("a valid set-up"));
     run.layers = Layers::equal(6, 3000.0).expect("a valid set-up");
     run.range_m = vec![1500.0, 3000.0];
     let mut prepared = run.prepare::<f32>().expect("a valid set-up");

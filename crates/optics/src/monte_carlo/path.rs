@@ -129,13 +129,6 @@ pub(crate) struct Tap {
     pub(crate) distance: usize,
 }
 
-/// A screen or the ranges at one position along the path.
-struct PathPoint {
-    position_m: f64,
-    screen: Option<usize>,
-    outputs: Range<usize>,
-}
-
 impl Leg {
     /// Ranges that the leg reaches: index, and whether the leg passes it.
     pub(crate) fn ranges(&self) -> impl Iterator<Item = (usize, bool)> {
@@ -189,39 +182,25 @@ impl Path {
             )?;
         }
         let mut path = Self::default();
-        let points = path.add_screens(layers, range_m, cn2, wavelength_m)?;
         let largest_step_m = grid.largest_step_m(wavelength_m);
-        let mut from_m = 0.0;
-        let mut screen = None;
-        let mut legs = Vec::new();
-        for point in points {
-            let length_m = point.position_m - from_m;
-            let times = (length_m / largest_step_m - 1e-9).ceil().max(1.0);
-            legs.push(Leg {
-                screen,
-                tap: None,
-                distance: path.index_of_distance(length_m / times),
-                times: times as usize,
-                outputs: point.outputs,
-            });
-            from_m = point.position_m;
-            screen = point.screen;
-        }
+        let legs = path.legs(layers, range_m, cn2, wavelength_m, largest_step_m)?;
         path.join(legs, largest_step_m);
         Ok(path)
     }
 
-    /// Computes the strengths of the screens. Returns the positions of screens and
-    /// ranges, increasing.
-    fn add_screens(
+    /// Legs from screen to screen and to the ends of layers with ranges, none of them joined.
+    fn legs(
         &mut self,
         layers: &Layers,
         range_m: &[f64],
         cn2: &Cn2Path,
         wavelength_m: f64,
-    ) -> Result<Vec<PathPoint>, Error> {
+        largest_step_m: f64,
+    ) -> Result<Vec<Leg>, Error> {
         let furthest = range_m.last().copied().unwrap_or_default();
-        let mut points = Vec::new();
+        let mut legs = Vec::new();
+        let mut from_m = 0.0;
+        let mut screen = None;
         let mut reached = 0;
         for (start, end) in layers.bounds_m() {
             if start >= furthest || same(start, furthest) {
@@ -229,11 +208,14 @@ impl Path {
             }
             if !cn2.is_none() {
                 let cn2_thickness = cn2.mean(start, end)? * (end - start);
-                points.push(PathPoint {
-                    position_m: 0.5 * (start + end),
-                    screen: Some(self.strength.len()),
+                let middle_m = 0.5 * (start + end);
+                legs.push(Leg {
+                    screen,
                     outputs: reached..reached,
+                    ..self.leg(middle_m - from_m, largest_step_m)
                 });
+                from_m = middle_m;
+                screen = Some(self.strength.len());
                 let wavenumber_rad_m = 2.0 * std::f64::consts::PI / wavelength_m;
                 self.strength.push(wavenumber_rad_m * cn2_thickness.sqrt());
             }
@@ -243,14 +225,28 @@ impl Path {
                 reached += 1;
             }
             if reached > first {
-                points.push(PathPoint {
-                    position_m: if cn2.is_none() { range_m[first] } else { end },
-                    screen: None,
+                let to_m = if cn2.is_none() { range_m[first] } else { end };
+                legs.push(Leg {
+                    screen: screen.take(),
                     outputs: first..reached,
+                    ..self.leg(to_m - from_m, largest_step_m)
                 });
+                from_m = to_m;
             }
         }
-        Ok(points)
+        Ok(legs)
+    }
+
+    /// A leg of this length in steps of at most `largest_step_m`, without screen and outputs.
+    fn leg(&mut self, length_m: f64, largest_step_m: f64) -> Leg {
+        let times = (length_m / largest_step_m - 1e-9).ceil().max(1.0);
+        Leg {
+            screen: None,
+            tap: None,
+            distance: self.index_of_distance(length_m / times),
+            times: times as usize,
+            outputs: 0..0,
+        }
     }
 
     /// Appends legs; two become one with a tap where one step reaches past a range.

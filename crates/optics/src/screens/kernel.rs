@@ -22,26 +22,8 @@ const LANES: usize = 16;
 /// Order of the polynomials which carry the low frequencies of a screen.
 pub(crate) const LOW_ORDER: usize = 16;
 
-mod sealed {
-    use super::FftNum;
-
-    /// Operations of the inner loops on a number, beside its arithmetic.
-    pub trait Scalar: FftNum {
-        /// The nearest number of this type.
-        fn of_i32(value: i32) -> Self;
-        /// Square root; 0 below 0.
-        fn root(self) -> Self;
-        /// Sine and cosine.
-        fn sin_cos(self) -> (Self, Self);
-        /// Sine and cosine of `self` + `quadrant` pi/2 for |self| <= pi/4.
-        fn sin_cos_of_quadrant(self, quadrant: u32) -> (Self, Self);
-        /// -2 ln(self) for 0 < self <= 1.
-        fn minus_two_ln(self) -> Self;
-    }
-}
-
 /// Number type of the wave-optics code: `f32` or `f64`.
-pub trait Real: sealed::Scalar + FftNum + Default + PartialOrd {
+pub trait Real: FftNum + Default + PartialOrd {
     /// The nearest number of this type.
     fn of(value: f64) -> Self;
     /// The number as f64.
@@ -49,6 +31,21 @@ pub trait Real: sealed::Scalar + FftNum + Default + PartialOrd {
     /// The forward and the inverse Fourier transform of a length; of each type by itself, so that
     /// the planner is compiled with this crate and not again by each program that names the type.
     fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2];
+    /// The nearest number of this type.
+    #[doc(hidden)]
+    fn of_i32(value: i32) -> Self;
+    /// Square root; 0 below 0.
+    #[doc(hidden)]
+    fn root(self) -> Self;
+    /// Sine and cosine.
+    #[doc(hidden)]
+    fn sin_cos(self) -> (Self, Self);
+    /// Sine and cosine of `self` + `quadrant` pi/2 for |self| <= pi/4.
+    #[doc(hidden)]
+    fn sin_cos_of_quadrant(self, quadrant: u32) -> (Self, Self);
+    /// -2 ln(self) for 0 < self <= 1.
+    #[doc(hidden)]
+    fn minus_two_ln(self) -> Self;
 }
 
 /// field *= exp(j scale phase).
@@ -185,7 +182,7 @@ pub(crate) fn finish_screen<T: Real>(
 
 macro_rules! scalar {
     ($real:ident, $bits:ident, $mantissa:expr, $sqrt_half:expr, $one_exp:expr, $pi_half:expr, $sin:expr, $cos:expr, $log:expr) => {
-        impl sealed::Scalar for $real {
+        impl Real for $real {
             #[inline(always)]
             fn of_i32(value: i32) -> Self {
                 value as $real
@@ -239,9 +236,7 @@ macro_rules! scalar {
                 let ln_m = 2.0 * t * polynomial(&$log, t * t);
                 -2.0 * (ln_m + exponent * std::$real::consts::LN_2)
             }
-        }
 
-        impl Real for $real {
             fn of(value: f64) -> Self {
                 value as $real
             }
@@ -334,20 +329,19 @@ scalar!(
 
 #[cfg(test)]
 mod tests {
-    use super::sealed::Scalar;
     use super::*;
 
     #[test]
     fn sine_and_cosine_agree_with_the_standard_library() {
         for i in 0..200_000 {
             let x = (f64::from(i) - 1e5) * 0.003_171_3;
-            let (s, c) = Scalar::sin_cos(x);
+            let (s, c) = Real::sin_cos(x);
             assert!(
                 (s - x.sin()).abs() < 3e-16 && (c - x.cos()).abs() < 3e-16,
                 "{x}"
             );
             let y = x as f32;
-            let (s, c) = Scalar::sin_cos(y);
+            let (s, c) = Real::sin_cos(y);
             let wide = f64::from(y);
             assert!(
                 (f64::from(s) - wide.sin()).abs() < 1.5e-7

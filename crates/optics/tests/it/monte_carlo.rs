@@ -2,7 +2,7 @@
 
 use crate::oracle::weak::{LARGEST_RYTOV, weak_turbulence_efficiency};
 use std::ops::ControlFlow;
-use wakescope_optics::air::{Scales, StructureTable};
+use wakescope_optics::air::StructureTable;
 use wakescope_optics::monte_carlo::{EfficiencyEstimate, Progress, Sampling};
 use wakescope_optics::screens::Real;
 use wakescope_optics::theory::{bistatic_efficiency_screens, free_space_efficiency};
@@ -123,13 +123,7 @@ fn free_space_on_the_chapters_grid_is_within_1e_3_raw_and_exact_when_corrected()
 #[test]
 fn infinite_outer_scale_agrees_with_exact_theory() {
     let mut run = coarse(1e-14, 12);
-    let spectrum = VonKarman::new(
-        Scales {
-            outer_scale_m: f64::INFINITY,
-            inner_scale_m: 0.01,
-        },
-        0.033,
-    );
+    let spectrum = VonKarman::new(f64::INFINITY, 0.01, 0.033);
     run.turbulence.spectrum = std::sync::Arc::new(spectrum.expect("spectrum"));
     run.range_m = vec![900.0, 2100.0];
     let estimate = run.run_in::<f32>(Stop::after(200), go).expect("run");

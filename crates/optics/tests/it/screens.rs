@@ -2,7 +2,7 @@
 //! against the expected.
 
 use std::sync::Arc;
-use wakescope_optics::air::{HillAndrews, Scales, structure_function_m53};
+use wakescope_optics::air::{HillAndrews, structure_function_m53};
 use wakescope_optics::screens::{ScreenGenerator, stream};
 use wakescope_optics::{Grid, Spectrum, VonKarman};
 
@@ -33,13 +33,7 @@ fn expected_structure_function_is_within_0_1_percent_of_theory() {
     let width = 1.024;
     for outer_scale_m in [0.1 * width, 1.0, 10.0, f64::INFINITY] {
         for inner_scale_m in [8e-3, 0.02] {
-            let spectrum = VonKarman::new(
-                Scales {
-                    outer_scale_m,
-                    inner_scale_m,
-                },
-                0.033,
-            );
+            let spectrum = VonKarman::new(outer_scale_m, inner_scale_m, 0.033);
             let worst = worst_error(grid, Arc::new(spectrum.expect("spectrum")));
             assert!(
                 worst < 1e-3,
@@ -59,11 +53,7 @@ fn expected_structure_function_holds_on_rectangular_and_prime_grids_and_for_othe
     };
     let worst = worst_error(rectangular, Arc::new(VonKarman::table2()));
     assert!(worst < 1e-3, "{worst}");
-    let hill = HillAndrews::new(Scales {
-        outer_scale_m: 0.8,
-        inner_scale_m: 0.02,
-    })
-    .expect("spectrum");
+    let hill = HillAndrews::new(0.8, 0.02).expect("spectrum");
     let worst = worst_error(Grid::square(128, 4e-3).expect("grid"), Arc::new(hill));
     assert!(worst < 1e-3, "{worst}");
 }

@@ -131,17 +131,18 @@ impl RefractiveTurbulence {
         height_m: f64,
         elevation_rad: f64,
     ) -> Result<optics::Turbulence, optics::Error> {
-        let scales = optics::air::Scales {
-            outer_scale_m: self.outer_scale_m,
-            inner_scale_m: self.inner_scale_m,
-        };
+        let outer_scale_m = self.outer_scale_m;
+        let inner_scale_m = self.inner_scale_m;
         let spectrum: Arc<dyn optics::Spectrum> = match self.spectrum {
             SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(
-                scales,
+                outer_scale_m,
+                inner_scale_m,
                 optics::air::CHAPTER_CONSTANT,
             )?),
             SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
-            SpectrumKind::HillAndrews => Arc::new(optics::air::HillAndrews::new(scales)?),
+            SpectrumKind::HillAndrews => {
+                Arc::new(optics::air::HillAndrews::new(outer_scale_m, inner_scale_m)?)
+            }
         };
         let cn2 = self.cn2_along(height_m, elevation_rad);
         Ok(optics::Turbulence {
