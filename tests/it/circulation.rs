@@ -5,9 +5,9 @@
 use fixtures::pair::{CIRCULATION_M2_S, truth};
 use ndarray::Array2;
 use wakescope_estimate::vortex_fit::{
-    EstimatorResponse, FreeParameters, Loss, MapFit, MapFitOptions, Parameter, Powers, PulseShape,
-    ScanModel, ScanSetup, Sharing, SignalFit, SignalFitOptions, VelocityMap, WakeModel,
-    fit_map_of_estimator, fit_signals,
+    EstimatorResponse, FreeParameters, Loss, MapFit, MapFitOptions, Parameter, Powers, ScanModel,
+    ScanSetup, Sharing, SignalFit, SignalFitOptions, VelocityMap, WakeModel, fit_map_of_estimator,
+    fit_signals,
 };
 use wakescope_estimate::{
     Correlogram, Radius, Refinement, Scan, SignalKind, SpectralPeak,
@@ -50,7 +50,7 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
         sampling: scene.sampling().unwrap(),
         kind: SignalKind::Real,
         noise: Noise::Band { floor: 0.0 },
-        pulse: PulseShape::gaussian(plan.instrument.pulse.sigma_s()).unwrap(),
+        pulse_sigma_s: plan.instrument.pulse.sigma_s(),
         wake: WakeModel::default(),
         elevation_rad: plan.geometry.elevation_rad.clone(),
         first_sample_time_s: 2.0 * scene.scan.range_min_m
@@ -123,7 +123,7 @@ fn map_fit(taken: &Taken, options: &MapFitOptions) -> MapFit {
         &statistic,
         &estimator,
         &sampling,
-        &setup.pulse,
+        setup.pulse_sigma_s,
         noise,
         RADIUS_M,
     )

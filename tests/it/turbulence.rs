@@ -163,7 +163,7 @@ fn of_draws(draws: u64, air: Option<Air>, turbulence: Option<Turbulence>) -> Vec
             velocity_m_s: &exact + &drawn(&map, air, &mut rng),
             ..map.clone()
         };
-        fit_scan(&map, Velocities::Means, &options).unwrap().result
+        fit_scan(&map, Velocities::Means, &options).unwrap()
     });
     results.collect()
 }

@@ -5,7 +5,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
 use wakescope_estimate::vortex_fit::{
-    FreeParameters, Powers, PulseShape, ScanModel, ScanSetup, ScanSignals, Wake, WakeModel,
+    FreeParameters, Powers, ScanModel, ScanSetup, ScanSignals, Wake, WakeModel,
 };
 use wakescope_estimate::{Sampling, SignalKind, bound::Noise};
 
@@ -16,7 +16,7 @@ fn likelihood(criterion: &mut Criterion) {
         sampling: Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap(),
         kind: SignalKind::Real,
         noise: Noise::Band { floor: 0.0 },
-        pulse: PulseShape::gaussian(120.1e-9).unwrap(),
+        pulse_sigma_s: 120.1e-9,
         wake: WakeModel::default(),
         elevation_rad: (0..185).map(|i| 1.25e-3 * f64::from(i)).collect(),
         first_sample_time_s: 1.875e-6,

@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => made_up(&options.model)?,
     };
     let begin = std::time::Instant::now();
-    let found = fit_scan(&map, Velocities::Means, &options)?.result;
+    let found = fit_scan(&map, Velocities::Means, &options)?;
     println!(
         "vortex,circulation_m2_s,std,gamma_5_15_m2_s,std,lateral_position_m,std,height_m,std,core_radius_m,std"
     );

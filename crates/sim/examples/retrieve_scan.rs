@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..RetrievalOptions::default()
     };
     for scan in scans {
-        let found = fit_scan(&scan.map, Velocities::Means, &options)?.result;
+        let found = fit_scan(&scan.map, Velocities::Means, &options)?;
         println!(
             "sweep {}: statistic {:.1}, {:?}",
             scan.sweep, found.statistic, found.flags

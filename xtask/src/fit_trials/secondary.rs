@@ -236,8 +236,8 @@ fn map_errors(kind: &MapKind, seed: u64) -> Result<Option<ScanErrors>, Failure> 
         };
         fit_scan(&map, Velocities::Means, &options)
     };
-    let pair = with_secondary(Secondary::Never)?.result;
-    let four = with_secondary(Secondary::Always)?.result;
+    let pair = with_secondary(Secondary::Never)?;
+    let four = with_secondary(Secondary::Always)?;
     let scan = ScanErrors {
         shows_secondary: pair.has(Flag::SecondaryVortices),
         pair: result_errors(&pair, &truth, kind.profile),

@@ -73,7 +73,7 @@ impl<'a> FitTrial<'a> {
             &self.tapered,
             &self.peak,
             &setup.sampling,
-            &setup.pulse,
+            setup.pulse_sigma_s,
             noise,
             RADIUS_M,
         )?;

@@ -15,7 +15,7 @@ use wakescope_estimate::estimators::ModelPeak;
 use wakescope_estimate::map::good_and_bad;
 use wakescope_estimate::spectrum::unweighted_lags;
 use wakescope_estimate::vortex_fit::{
-    EstimatorResponse, MapFitOptions, PARAMETERS, PulseShape, VelocityMap, Wake, WakeModel,
+    EstimatorResponse, MapFitOptions, PARAMETERS, VelocityMap, Wake, WakeModel,
     refine_map_fit_of_estimator,
 };
 use wakescope_estimate::{Correlogram, Refinement, SignalKind, SpectralPeak, Weighting};
@@ -278,9 +278,9 @@ pub(super) fn basins(profile: Profile) -> Result<Vec<Panel>, Failure> {
     )?;
     let statistic = Correlogram::<f64>::new(Weighting::default(), WINDOW)?;
     let air = Air::new(NoiseModel::White, PULSE_S, 10.0, SEED)?;
-    let pulse = PulseShape::gaussian(air.known.sigma_s)?;
     let noise = (Noise::White, 10.0);
-    let response = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, noise, 2.0)?;
+    let sigma_s = air.known.sigma_s;
+    let response = EstimatorResponse::new(&statistic, &peak, &sampling, sigma_s, noise, 2.0)?;
     let elevation_rad: Vec<f64> = (0..26).map(|i| 0.02 + 0.007 * f64::from(i)).collect();
     let range_m: Vec<f64> = (0..13).map(|i| 320.0 + 13.0 * f64::from(i)).collect();
     let model = WakeModel::default();

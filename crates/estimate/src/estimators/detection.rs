@@ -189,7 +189,7 @@ impl NoiseTest {
         self.region(
             places
                 .chords(point, radius_m)
-                .map(|chord| (chord.gates(), places.rays.count(chord.line))),
+                .map(|(line, gates)| (gates.len(), places.rays.count(line))),
         )
     }
 

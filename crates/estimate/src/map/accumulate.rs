@@ -14,7 +14,7 @@ use ndarray::ArrayView2;
 use crate::error::{Error, length, not_negative};
 use crate::estimators::{Estimator, GateVelocity, Quality, Statistic};
 use crate::map::region::effective;
-use crate::map::{Chord, PolarPoint, ScanGeometry, WindowCorrelation};
+use crate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
 use crate::parallel::map_indexed;
 use crate::window::missing::MissingRule;
 use crate::window::{Gates, Sample, Sampling, Scratch};
@@ -145,9 +145,9 @@ impl Scan {
         length("mean", self.numbers, mean.len())?;
         mean.fill(0.0);
         let mut level = 0;
-        for chord in self.chords(point, radius_m) {
-            level += self.valid(chord);
-            self.add_chord(chord, mean);
+        for (line, gates) in self.chords(point, radius_m) {
+            level += self.valid(line, &gates);
+            self.add_chord(line, &gates, mean);
         }
         if level > 0 {
             let weight = 1.0 / level as f64;
@@ -196,8 +196,8 @@ impl Scan {
     /// Windows of a region that are stored, valid or not.
     fn windows(&self, point: PolarPoint, radius_m: f64) -> usize {
         let mut windows = 0;
-        for chord in self.chords(point, radius_m) {
-            windows += chord.gates() * self.geometry.rays.count(chord.line);
+        for (line, gates) in self.chords(point, radius_m) {
+            windows += gates.len() * self.geometry.rays.count(line);
         }
         windows
     }
@@ -208,18 +208,18 @@ impl Scan {
         let start = self.held.start;
         let mut level = 0;
         let mut pairs = 0.0;
-        for chord in self.chords(point, radius_m) {
-            level += self.valid(chord);
-            let whole = correlation.pair_sum(chord.gates());
+        for (line, gates) in self.chords(point, radius_m) {
+            level += self.valid(line, &gates);
+            let whole = correlation.pair_sum(gates.len());
             if self.of_products {
-                pairs += self.geometry.rays.count(chord.line) as f64 * whole;
+                pairs += self.geometry.rays.count(line) as f64 * whole;
                 continue;
             }
-            for ray in self.geometry.line_rays(chord.line) {
+            for ray in self.geometry.line_rays(line) {
                 pairs += match self.invalid.get(&ray) {
                     None => whole,
                     Some(invalid) => valid_pairs(
-                        &invalid[chord.first - start..=chord.last - start],
+                        &invalid[gates.start - start..gates.end - start],
                         correlation,
                     ),
                 };
@@ -229,36 +229,36 @@ impl Scan {
     }
 
     /// Chords of a region within the stored gates, by increasing elevation.
-    fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
-        self.geometry.chords(point, radius_m).filter_map(|chord| {
-            let first = chord.first.max(self.held.start);
-            let last = chord.last.min(self.held.end - 1);
-            (first <= last).then_some(Chord {
-                first,
-                last,
-                ..chord
-            })
+    fn chords(
+        &self,
+        point: PolarPoint,
+        radius_m: f64,
+    ) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
+        let chords = self.geometry.chords(point, radius_m);
+        chords.filter_map(|(line, gates)| {
+            let held = gates.start.max(self.held.start)..gates.end.min(self.held.end);
+            (!held.is_empty()).then_some((line, held))
         })
     }
 
     /// Valid windows of a chord.
-    fn valid(&self, chord: Chord) -> usize {
-        let row = chord.line * (self.held.len() + 1);
+    fn valid(&self, line: usize, gates: &Range<usize>) -> usize {
+        let row = line * (self.held.len() + 1);
         let counts = &self.counts[row..row + self.held.len() + 1];
-        counts[chord.last + 1 - self.held.start] - counts[chord.first - self.held.start]
+        counts[gates.end - self.held.start] - counts[gates.start - self.held.start]
     }
 
     /// Adds the sum over a chord to `out`: whole blocks, and the gates before and behind them.
-    fn add_chord(&self, chord: Chord, out: &mut [f64]) {
+    fn add_chord(&self, line: usize, gates: &Range<usize>, out: &mut [f64]) {
         let start = self.held.start;
         let numbers = self.numbers;
         let line_numbers = self.held.len() * numbers;
         let line_blocks = self.blocks.len() / self.geometry.lines();
-        let rows = &self.rows[chord.line * line_numbers..][..line_numbers];
-        let blocks = &self.blocks[chord.line * line_blocks..][..line_blocks];
-        let mut gate = chord.first;
-        while gate <= chord.last {
-            if gate.is_multiple_of(BLOCK) && gate + BLOCK <= chord.last + 1 {
+        let rows = &self.rows[line * line_numbers..][..line_numbers];
+        let blocks = &self.blocks[line * line_blocks..][..line_blocks];
+        let mut gate = gates.start;
+        while gate < gates.end {
+            if gate.is_multiple_of(BLOCK) && gate + BLOCK <= gates.end {
                 let block = gate / BLOCK - start.div_ceil(BLOCK);
                 add(out, &blocks[block * numbers..][..numbers]);
                 gate += BLOCK;

@@ -10,5 +10,5 @@ pub use accumulate::{MapPoint, Radius, Scan, ScanSums};
 pub use error_map::{ErrorMap, ErrorStatistics};
 pub use mixture::{GoodAndBad, good_and_bad};
 pub use region::{
-    Chord, LineOfSight, PolarPoint, ScanGeometry, WindowCorrelation, WindowCovariance, polar_points,
+    LineOfSight, PolarPoint, ScanGeometry, WindowCorrelation, WindowCovariance, polar_points,
 };

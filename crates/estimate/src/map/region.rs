@@ -61,25 +61,6 @@ pub fn polar_points(elevation_rad: &[f64], range_m: &[f64]) -> Vec<PolarPoint> {
     points
 }
 
-/// Gates `first` ..= `last` of line of sight `line` that lie in a region.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Chord {
-    /// Index of the line of sight, by increasing elevation.
-    pub line: usize,
-    /// First gate.
-    pub first: usize,
-    /// Last gate.
-    pub last: usize,
-}
-
-impl Chord {
-    /// Number of gates of the chord, at least 1.
-    #[must_use]
-    pub fn gates(&self) -> usize {
-        self.last - self.first + 1
-    }
-}
-
 /// Which records (rays) belong to each line of sight: listed, which needs memory for each ray, or one line after the other.
 #[derive(Debug, Clone)]
 pub(crate) struct Rays {
@@ -341,10 +322,15 @@ impl ScanGeometry {
         (range_m - self.first_range_m) / self.spacing_m
     }
 
-    /// Chords of the disc of radius `radius_m` \[m\] about `point`, by increasing elevation.
+    /// Chords of the disc of radius `radius_m` \[m\] about `point`: lines of sight by increasing
+    /// elevation, and the gates of each that lie in it.
     ///
     /// A window on the circle counts as inside (up to a millionth of the gate spacing).
-    pub fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
+    pub fn chords(
+        &self,
+        point: PolarPoint,
+        radius_m: f64,
+    ) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
         let slack_m = 1e-6 * self.spacing_m;
         let radius_m = radius_m + slack_m;
         let reach = reach_of_disc(radius_m / point.range_m);
@@ -354,8 +340,8 @@ impl ScanGeometry {
                 let missed = self.lines_that_miss(point.line, line, reach);
                 if missed > 0 {
                     lines.start = lines.start.saturating_add(missed - 1).min(lines.end);
-                } else if let Some(chord) = self.chord_of(point, radius_m, line) {
-                    return Some(chord);
+                } else if let Some(gates) = self.gates_within(point, radius_m, line) {
+                    return Some((line, gates));
                 }
             }
             None
@@ -363,7 +349,7 @@ impl ScanGeometry {
     }
 
     /// The chord of a disc along a line.
-    fn chord_of(&self, point: PolarPoint, radius_m: f64, line: usize) -> Option<Chord> {
+    fn gates_within(&self, point: PolarPoint, radius_m: f64, line: usize) -> Option<Range<usize>> {
         let (sin, cos) = self.sin_cos_to(point.line, line);
         let across_m = point.range_m * sin;
         let along_m = point.range_m * cos;
@@ -375,11 +361,7 @@ impl ScanGeometry {
         let first = self.gate_at(along_m - half_m).ceil().max(0.0);
         let last = self.gate_at(along_m + half_m).floor();
         let last = last.min(self.gates as f64 - 1.0);
-        (first <= last).then_some(Chord {
-            line,
-            first: first as usize,
-            last: last as usize,
-        })
+        (first <= last).then_some(first as usize..last as usize + 1)
     }
 
     /// Lines that may touch the disc; none for a point on a line that the scan does not have.
@@ -448,8 +430,8 @@ impl ScanGeometry {
         correlation: &WindowCorrelation,
     ) -> (usize, f64) {
         let mut pairs = 0.0;
-        for chord in self.chords(point, radius_m) {
-            pairs += self.rays.count(chord.line) as f64 * correlation.pair_sum(chord.gates());
+        for (line, gates) in self.chords(point, radius_m) {
+            pairs += self.rays.count(line) as f64 * correlation.pair_sum(gates.len());
         }
         let level = self.windows(point, radius_m);
         (level, effective(level, pairs))
@@ -459,8 +441,8 @@ impl ScanGeometry {
     #[must_use]
     pub fn windows(&self, point: PolarPoint, radius_m: f64) -> usize {
         let mut windows = 0;
-        for chord in self.chords(point, radius_m) {
-            windows += self.rays.count(chord.line) * chord.gates();
+        for (line, gates) in self.chords(point, radius_m) {
+            windows += self.rays.count(line) * gates.len();
         }
         windows
     }
@@ -470,10 +452,10 @@ impl ScanGeometry {
     #[must_use]
     pub fn information(&self, point: PolarPoint, radius_m: f64, by_gates: &[f64]) -> f64 {
         let mut information = 0.0;
-        for chord in self.chords(point, radius_m) {
-            let index = chord.gates().min(by_gates.len()).wrapping_sub(1);
+        for (line, gates) in self.chords(point, radius_m) {
+            let index = gates.len().min(by_gates.len()).wrapping_sub(1);
             let of_ray = by_gates.get(index).copied().unwrap_or(0.0);
-            information += self.rays.count(chord.line) as f64 * of_ray;
+            information += self.rays.count(line) as f64 * of_ray;
         }
         information
     }
@@ -762,7 +744,7 @@ mod tests {
         let by_gates: Vec<f64> = (1..=20).map(|gates| f64::from(gates).powf(1.5)).collect();
         let direct: f64 = geometry
             .chords(point, 2.0)
-            .map(|chord| by_gates[chord.gates() - 1])
+            .map(|(_, gates)| by_gates[gates.len() - 1])
             .sum();
         assert_relative_eq!(
             geometry.information(point, 2.0, &by_gates),
@@ -770,7 +752,10 @@ mod tests {
             max_relative = 1e-12
         );
         assert_eq!(
-            geometry.chords(point, 2.0).map(|chord| chord.gates()).max(),
+            geometry
+                .chords(point, 2.0)
+                .map(|(_, gates)| gates.len())
+                .max(),
             Some(geometry.most_gates(2.0))
         );
         // Longer chords than are known have what the longest known has.
@@ -811,7 +796,7 @@ mod tests {
             let point = PolarPoint::on_line(ranges_m[gate], line);
             let found: Vec<_> = geometry
                 .chords(point, radius_m)
-                .flat_map(|chord| (chord.first..=chord.last).map(move |gate| (chord.line, gate)))
+                .flat_map(|(line, gates)| gates.map(move |gate| (line, gate)))
                 .collect();
             assert_eq!(found, inside, "{line} {gate} {radius_m}");
             assert_eq!(
@@ -851,7 +836,7 @@ mod tests {
             }
             let found: Vec<_> = geometry
                 .chords(point, radius_m)
-                .flat_map(|chord| (chord.first..=chord.last).map(move |gate| (chord.line, gate)))
+                .flat_map(|(line, gates)| gates.map(move |gate| (line, gate)))
                 .collect();
             assert_eq!(found, inside, "{point:?} {radius_m}");
         }

@@ -5,8 +5,7 @@
 use crate::error::Error;
 use crate::retrieval::estimates_in_turbulence::{Estimates, TurbulentFit};
 use crate::retrieval::{
-    Flag, Movement, RetrievalOptions, ScanEstimator, ScanFit, ScanMap, ScanResult, Turbulence,
-    VortexResult,
+    Flag, Movement, RetrievalOptions, ScanEstimator, ScanMap, ScanResult, Turbulence, VortexResult,
 };
 use crate::vortex_fit::map_fit::data::ends;
 use crate::vortex_fit::map_fit::starts::chi2;
@@ -22,7 +21,7 @@ pub(super) fn fit_estimates(
     estimator: &dyn ScanEstimator,
     options: &RetrievalOptions,
     found: &ScanResult,
-) -> Option<ScanFit> {
+) -> Option<ScanResult> {
     let range_m = wake_range_m(map, options, found);
     let spacing_rad = spacing(&map.elevation_rad);
     let response = estimator.response(range_m)?;
@@ -89,28 +88,26 @@ struct EstimateFits<'a> {
 
 impl EstimateFits<'_> {
     /// The fit that is reported where means show `found`.
-    fn reported(&self, found: &ScanResult) -> Option<ScanFit> {
+    fn reported(&self, found: &ScanResult) -> Option<ScanResult> {
         match (self.pair(found), found.vortices.len()) {
             (Ok(pair), 2) => Some(pair),
             // What is beyond the scan acts on what is in it, but is not reported. Where nothing is found in it, anything may be beyond.
-            (Ok(pair), 1) if self.is_lone_or_certain(&pair.result) => Some(ScanFit {
-                result: pair.result.reporting(|vortex| self.observes(vortex)),
-                ..pair
-            }),
-            (Ok(pair), _) if self.is_likely_in_view(&pair.result) => Some(with_certainty(pair)),
+            (Ok(pair), 1) if self.is_lone_or_certain(&pair) => {
+                Some(pair.reporting(|vortex| self.observes(vortex)))
+            }
+            (Ok(pair), _) if self.is_likely_in_view(&pair) => Some(with_certainty(pair)),
             (pair, 1) => {
                 let mut one = self.one(found)?;
-                let may_be_pair = pair.is_ok_and(|pair| self.is_hidden(&pair.result));
-                let is_ambiguous = may_be_pair || one.result.has(Flag::Ambiguous);
-                one.result.set(Flag::Ambiguous, is_ambiguous);
-                let is_certain = one.result.vortices.iter().all(VortexResult::is_certain);
+                let may_be_pair = pair.is_ok_and(|pair| self.is_hidden(&pair));
+                let is_ambiguous = may_be_pair || one.has(Flag::Ambiguous);
+                one.set(Flag::Ambiguous, is_ambiguous);
+                let is_certain = one.vortices.iter().all(VortexResult::is_certain);
                 is_certain.then_some(one)
             }
             (Ok(pair), _) => Some(without_vortices(pair)),
-            (Err(Error::NoVortex { statistic, needed }), 0) => Some(ScanFit {
-                result: without_wake(found, statistic, needed),
-                model: self.options.model,
-            }),
+            (Err(Error::NoVortex { statistic, needed }), 0) => {
+                Some(without_wake(found, statistic, needed))
+            }
             (Err(_), _) => None,
         }
     }
@@ -211,7 +208,7 @@ impl EstimateFits<'_> {
     ///
     /// # Errors
     /// What the fit of the pair refuses.
-    fn pair(&self, found: &ScanResult) -> Result<ScanFit, Error> {
+    fn pair(&self, found: &ScanResult) -> Result<ScanResult, Error> {
         let (mut fit, moves) = self.best(None)?;
         let turbulent = self.in_turbulence(&fit, moves)?;
         if let Some(turbulent) = &turbulent
@@ -255,38 +252,34 @@ impl EstimateFits<'_> {
         result.threshold = self.map_options.least_statistic;
         result.set(Flag::SecondaryVortices, are_shown);
         result.set(Flag::LocalCirculation, are_local);
-        Ok(ScanFit {
-            result,
-            model: options.model,
-        })
+        Ok(result)
     }
 
     /// A pair in turbulence that stands out of the noise: what else is in the air is part of that.
-    fn of_turbulent(&self, found: &ScanResult, turbulent: &TurbulentFit, moves: bool) -> ScanFit {
+    fn of_turbulent(
+        &self,
+        found: &ScanResult,
+        turbulent: &TurbulentFit,
+        moves: bool,
+    ) -> ScanResult {
         let fit = &turbulent.fit;
         let mut result = result_of(found, self.scan, self.options, fit, moves);
         result.statistic = fit.statistic;
         result.threshold = self.map_options.least_statistic;
         result.turbulence = Some(turbulent.turbulence);
         result.set(Flag::LocalCirculation, turbulent.is_local);
-        ScanFit {
-            result,
-            model: self.options.model,
-        }
+        result
     }
 
     /// The one vortex that is found; another may be there beyond the scan.
-    fn one(&self, found: &ScanResult) -> Option<ScanFit> {
+    fn one(&self, found: &ScanResult) -> Option<ScanResult> {
         let (fit, moves) = self.best(found.wake.as_ref()).ok()?;
         let turbulent = self.in_turbulence(&fit, moves).ok()?;
         let turbulence = turbulent.as_ref().map(|found| found.turbulence);
         let fit = turbulent.map_or(fit, |found| found.fit);
         let mut result = result_of(found, self.scan, self.options, &fit, moves);
         result.turbulence = turbulence;
-        Some(ScanFit {
-            result: result.reporting(|vortex| found.vortex(vortex.side).is_some()),
-            model: self.options.model,
-        })
+        Some(result.reporting(|vortex| found.vortex(vortex.side).is_some()))
     }
 }
 
@@ -301,9 +294,9 @@ fn is_likely(vortex: &VortexResult) -> bool {
 }
 
 /// The fit with a flag where a circulation is not certain.
-fn with_certainty(mut pair: ScanFit) -> ScanFit {
-    let are_certain = pair.result.vortices.iter().all(VortexResult::is_certain);
-    pair.result.set(Flag::Uncertain, !are_certain);
+fn with_certainty(mut pair: ScanResult) -> ScanResult {
+    let are_certain = pair.vortices.iter().all(VortexResult::is_certain);
+    pair.set(Flag::Uncertain, !are_certain);
     pair
 }
 
@@ -320,11 +313,11 @@ fn without_wake(found: &ScanResult, statistic: f64, needed: f64) -> ScanResult {
 }
 
 /// The fit of a wake that stands out of the wind, without its vortices, of which too little is known.
-fn without_vortices(pair: ScanFit) -> ScanFit {
-    let mut result = pair.result.reporting(|_| false);
+fn without_vortices(pair: ScanResult) -> ScanResult {
+    let mut result = pair.reporting(|_| false);
     result.wake = None;
     result.set(Flag::Uncertain, true);
-    ScanFit { result, ..pair }
+    result
 }
 
 /// The result of a fit to a map that has other vortices than the means showed.

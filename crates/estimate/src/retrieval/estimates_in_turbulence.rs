@@ -190,7 +190,7 @@ impl<'a> Estimates<'a, '_> {
         let covariance = self.covariance(pair, air, &noise, [&best.cells, &in_scan]);
         let nearby = setting.local_variance(&best, side, Scores::Correlated(&covariance))?;
         let variance = nearby + setting.variance_of_pair(&best, of_pair)?;
-        Some((best.tangent.at[CIRCULATIONS[side] as usize], variance))
+        Some((best.at[CIRCULATIONS[side] as usize], variance))
     }
 }
 

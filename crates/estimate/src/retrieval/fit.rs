@@ -11,9 +11,7 @@ use crate::error::Error;
 use crate::retrieval::estimates::fit_estimates;
 use crate::retrieval::gate_means::fit_means;
 use crate::retrieval::secondary::with_secondary_vortices;
-use crate::retrieval::{
-    Flag, RetrievalOptions, ScanFit, ScanMap, ScanResult, Turbulence, Velocities,
-};
+use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, Turbulence, Velocities};
 use crate::vortex_fit::Sharing;
 
 /// Gates that share most of their window are skipped unless fewer velocities are left.
@@ -31,7 +29,7 @@ pub fn fit_scan(
     map: &ScanMap,
     velocities: Velocities<'_>,
     options: &RetrievalOptions,
-) -> Result<ScanFit, Error> {
+) -> Result<ScanResult, Error> {
     let (estimator, is_likely) = match velocities {
         Velocities::Estimates(estimator) => (estimator, false),
         Velocities::LikelyEstimates(estimator) => (estimator, true),
@@ -58,8 +56,8 @@ pub fn fit_scan(
     };
     if is_likely {
         let means = fit_means(independent, options)?;
-        fit.result.add_distance_from(&means, map, &fit.model);
-        flag_taken_for_means(&mut fit.result);
+        fit.add_distance_from(&means, map);
+        flag_taken_for_means(&mut fit);
     }
     Ok(fit)
 }
@@ -69,14 +67,11 @@ fn fit_as_means(
     map: &ScanMap,
     options: &RetrievalOptions,
     are_means: bool,
-) -> Result<ScanFit, Error> {
+) -> Result<ScanResult, Error> {
     let pair = fit_means(map, options)?;
-    let mut fit = with_secondary_vortices(map, options, &pair)?.unwrap_or(ScanFit {
-        result: pair,
-        model: options.model,
-    });
+    let mut fit = with_secondary_vortices(map, options, &pair)?.unwrap_or(pair);
     if !are_means {
-        flag_taken_for_means(&mut fit.result);
+        flag_taken_for_means(&mut fit);
     }
     Ok(fit)
 }

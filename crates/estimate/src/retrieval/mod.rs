@@ -24,7 +24,7 @@
 //! let range_m = (0..20).map(|j| 330.0 + 7.0 * f64::from(j)).collect();
 //! let time_s = vec![0.0; 30];
 //! let map = ScanMap { elevation_rad, time_s, range_m, velocity_m_s, sigma_m_s: None, fold_m_s: None };
-//! let found = fit_scan(&map, Velocities::Means, &RetrievalOptions::default())?.result;
+//! let found = fit_scan(&map, Velocities::Means, &RetrievalOptions::default())?;
 //! assert!(found.has(Flag::NoWake) && (found.lateral_wind_m_s.value - 3.0).abs() < 0.1);
 //! # Ok::<(), wakescope_estimate::Error>(())
 //! ```
@@ -57,7 +57,7 @@ pub use gates::expected_velocities;
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use plausible::without_implausible_vortices;
 pub use radial_velocity::radial_velocity_method;
-pub use result::{Flag, ScanFit, ScanResult, Side, VortexResult};
+pub use result::{Flag, ScanResult, Side, VortexResult};
 pub use scan_map::ScanMap;
 pub use scan_turbulence::ScanTurbulence;
 pub(crate) use scan_turbulence::gate_covariance;

@@ -158,6 +158,7 @@ mod tests {
             threshold: 22.0,
             flags: vec![Flag::OneVortex, Flag::PoorFit],
             turbulence: None,
+            model: WakeModel::default(),
             tops: vec![],
         }
     }

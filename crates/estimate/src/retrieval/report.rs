@@ -183,6 +183,7 @@ impl<'a> Report<'a> {
             covariance,
             tops,
             turbulence: None,
+            model: self.stage.options.model,
         }
     }
 

@@ -240,6 +240,8 @@ pub struct ScanResult {
     pub tops: Vec<Top>,
     /// The turbulence that was found in the scan and taken into account, if that was requested.
     pub turbulence: Option<ScanTurbulence>,
+    /// The model that was fitted: that of the options, with the secondary vortices beside a pair if they were.
+    pub model: WakeModel,
 }
 
 impl ScanResult {
@@ -287,6 +289,7 @@ impl ScanResult {
             wind_shear_per_s: Measured::of_wake(Parameter::Shear, &wake, &covariance),
             covariance,
             tops,
+            model: *model,
             ..self.clone()
         };
         if result.vortices.len() != self.vortices.len() {
@@ -319,7 +322,7 @@ impl ScanResult {
     }
 
     /// Counts the distance from another result as an error, in all numbers that are known.
-    pub(crate) fn add_distance_from(&mut self, other: &Self, map: &ScanMap, model: &WakeModel) {
+    pub(crate) fn add_distance_from(&mut self, other: &Self, map: &ScanMap) {
         let Some((wake, other)) = self.wake.zip(other.wake) else {
             return;
         };
@@ -338,15 +341,7 @@ impl ScanResult {
             *c += distance[i] * distance[j];
         }
         let moves = !self.has(Flag::MotionIgnored);
-        *self = self.with_wake(map, model, (wake, covariance), self.tops.clone(), moves);
+        let tops = self.tops.clone();
+        *self = self.with_wake(map, &self.model, (wake, covariance), tops, moves);
     }
-}
-
-/// Outcome of the fit of a scan.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ScanFit {
-    /// What was found.
-    pub result: ScanResult,
-    /// The model that was fitted: that of the options, with the secondary vortices beside a pair if they were.
-    pub model: WakeModel,
 }

@@ -17,7 +17,7 @@ use crate::parallel::map_each;
 use crate::retrieval::{ScanMap, Whitening};
 use crate::turbulence::VonKarman;
 use crate::vortex_fit::map_fit::cells::Cell;
-use crate::vortex_fit::map_fit::least_squares::Rows;
+use crate::vortex_fit::map_fit::cells::Rows;
 use crate::vortex_fit::{Wake, WakeModel};
 use crate::wind_profile::{
     Block, GateCovariance, GatePosition, OUTER_SCALES_M, outer_scale_probabilities, spectra,

@@ -6,9 +6,9 @@ use ndarray::Array2;
 
 use crate::error::Error;
 use crate::retrieval::gate_means::{MOST, fit_means};
-use crate::retrieval::{Flag, RetrievalOptions, ScanFit, ScanMap, ScanResult, VortexResult};
+use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, VortexResult};
 use crate::vortex_fit::map_fit::gates::Gates;
-use crate::vortex_fit::map_fit::secondary::Found;
+use crate::vortex_fit::map_fit::secondary::SecondaryVortices;
 use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::{MapFitOptions, Parameter, Wake};
 
@@ -22,7 +22,7 @@ pub(super) fn with_secondary_vortices(
     map: &ScanMap,
     options: &RetrievalOptions,
     found: &ScanResult,
-) -> Result<Option<ScanFit>, Error> {
+) -> Result<Option<ScanResult>, Error> {
     let is_pair = found.vortices.len() == 2;
     // the least chi-square, where other spacings share in what is told
     let Some(pair) = found
@@ -38,31 +38,25 @@ pub(super) fn with_secondary_vortices(
     let Some(four) = search(map, options, &pair, moves)? else {
         return Ok(None);
     };
-    if !four.secondary.fitted {
+    if !four.fitted {
         let mut result = found.clone();
         result.set(Flag::SecondaryVortices, true);
-        return Ok(Some(ScanFit {
-            result,
-            model: options.model,
-        }));
+        return Ok(Some(result));
     }
     // what another profile would do was free in the search
     let mut options = RetrievalOptions {
         other_profile: false,
         ..options.clone()
     };
-    options.model.secondary = Some(four.secondary.vortices);
+    options.model.secondary = Some(four.vortices);
     options.start = Some(four.wake);
     let mut result = fit_means(map, &options)?;
     if result.vortices.len() < 2 {
         return Ok(None);
     }
-    result.set(Flag::SecondaryVortices, four.secondary.shown);
+    result.set(Flag::SecondaryVortices, four.shown);
     widen(&mut result, map, &four.covariance, &options);
-    Ok(Some(ScanFit {
-        result,
-        model: options.model,
-    }))
+    Ok(Some(result))
 }
 
 /// The pair with the secondary vortices that its scan, thinned if it has many velocities, shows beside it as means over gates.
@@ -74,7 +68,7 @@ fn search(
     options: &RetrievalOptions,
     pair: &Wake,
     moves: bool,
-) -> Result<Option<Found>, Error> {
+) -> Result<Option<SecondaryVortices>, Error> {
     let map_options = MapFitOptions {
         free: options.free,
         core_prior: options.core_prior,

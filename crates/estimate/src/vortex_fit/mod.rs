@@ -56,6 +56,5 @@ pub use wake::core_prior::CorePrior;
 pub use wake::free_parameters::{FreeParameters, Sharing, WindFit};
 pub use wake::pair::{CoreProfile, PARAMETERS, Parameter, Vortex, Wake, WakeModel};
 pub use wake::pair_prior::PairPrior;
-pub use wake::pulse::PulseShape;
 pub use wake::range_kernel::RangeKernel;
 pub use wake::rolling_moment::{Follower, LiftSlope};

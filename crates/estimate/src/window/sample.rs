@@ -6,15 +6,9 @@ use crate::window::SignalKind;
 use num_complex::Complex;
 use std::ops::Mul;
 
-mod sealed {
-    pub trait Sealed {}
-    impl Sealed for f64 {}
-    impl Sealed for num_complex::Complex<f64> {}
-}
-
 /// One sample of a window: `f64` or `Complex<f64>`.
 pub trait Sample:
-    Copy + Send + Sync + Into<Complex<f64>> + Mul<f64, Output = Self> + sealed::Sealed + 'static
+    Copy + Send + Sync + Into<Complex<f64>> + Mul<f64, Output = Self> + 'static
 {
     /// Kind of signal made of such samples.
     const KIND: SignalKind;

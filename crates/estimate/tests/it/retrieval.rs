@@ -12,9 +12,7 @@ fn exact_scans_give_the_truth_to_a_thousandth_of_the_bound() {
     for name in ["a", "b", "c"] {
         let mut case = case(name);
         case.map.velocity_m_s = case.exact.clone();
-        let found = fit_scan(&case.map, Velocities::Means, &case.options)
-            .unwrap()
-            .result;
+        let found = fit_scan(&case.map, Velocities::Means, &case.options).unwrap();
         let errors = errors_over_bounds(&case, &found);
         assert!(errors.iter().all(|e| e.abs() < 1e-3), "{name}: {errors:?}");
     }
@@ -25,7 +23,7 @@ fn an_impossible_start_is_passed_over() {
     let mut case = case("b");
     let errors = |case: &Case| {
         let found = fit_scan(&case.map, Velocities::Means, &case.options);
-        errors_over_bounds(case, &found.unwrap().result)
+        errors_over_bounds(case, &found.unwrap())
     };
     let blind = errors(&case);
     // Below the ground, where the model has no vortices.
@@ -44,9 +42,7 @@ fn stored_scans_are_within_three_bounds_of_the_truth_whether_the_wake_moves_or_n
             movement: Movement::Auto,
             ..case.options.clone()
         };
-        let found = fit_scan(&case.map, Velocities::Means, &options)
-            .unwrap()
-            .result;
+        let found = fit_scan(&case.map, Velocities::Means, &options).unwrap();
         let errors = errors_over_bounds(&case, &found);
         assert!(errors.iter().all(|e| e.abs() < 3.0), "{name}: {errors:?}");
         assert!(
@@ -86,9 +82,7 @@ fn stored_scans_are_within_three_bounds_of_the_truth_whether_the_wake_moves_or_n
 fn a_frozen_model_of_a_moving_wake_is_metres_off_and_fits_badly() {
     let mut case = case("c");
     case.options.movement = Movement::Frozen;
-    let found = fit_scan(&case.map, Velocities::Means, &case.options)
-        .unwrap()
-        .result;
+    let found = fit_scan(&case.map, Velocities::Means, &case.options).unwrap();
     let wake = found.wake.unwrap();
     assert!(
         (wake.right.lateral_position_m - 424.0 + 2.6).abs() < 0.8,
@@ -113,8 +107,7 @@ fn one_vortex_is_told_as_one_and_wind_as_no_wake() {
                 ..Default::default()
             },
         )
-        .unwrap()
-        .result;
+        .unwrap();
         assert!(
             found.has(Flag::OneVortex) && found.vortices.len() == 1,
             "{:?}",
@@ -137,9 +130,7 @@ fn one_vortex_is_told_as_one_and_wind_as_no_wake() {
         }
     }
     let (map, _) = stored(reference!("map_noise"));
-    let found = fit_scan(&map, Velocities::Means, &RetrievalOptions::default())
-        .unwrap()
-        .result;
+    let found = fit_scan(&map, Velocities::Means, &RetrievalOptions::default()).unwrap();
     assert!(found.has(Flag::NoWake) && found.vortices.is_empty() && found.wake.is_none());
     assert!((found.lateral_wind_m_s.value + 3.0).abs() < 4.0 * found.lateral_wind_m_s.std);
     assert!((found.wind_shear_per_s.value - 0.04).abs() < 4.0 * found.wind_shear_per_s.std);
@@ -165,9 +156,7 @@ fn outliers_and_unknown_deviations_leave_errors_that_the_covariance_tells() {
                 sigma_m_s,
                 ..case.map.clone()
             };
-            let found = fit_scan(&map, Velocities::Means, &case.options)
-                .unwrap()
-                .result;
+            let found = fit_scan(&map, Velocities::Means, &case.options).unwrap();
             let (p, truth) = (found.wake.unwrap().to_array(), case.truth.to_array());
             squares.extend(
                 (0..PARAMETERS).map(|i| (p[i] - truth[i]).powi(2) / found.covariance[[i, i]]),
@@ -281,8 +270,7 @@ fn weak_unequal_low_and_high_wakes_on_coarse_and_narrow_scans_are_within_their_e
             Velocities::Means,
             options,
         )
-        .unwrap()
-        .result;
+        .unwrap();
         let (p, truth) = (found.wake.unwrap().to_array(), wake.to_array());
         for i in 0..PARAMETERS {
             let sigma = found.covariance[[i, i]].sqrt();
@@ -315,8 +303,7 @@ fn vortices_beyond_or_at_the_end_of_the_sector_are_told() {
         Velocities::Means,
         &options,
     )
-    .unwrap()
-    .result;
+    .unwrap();
     assert!(
         found.has(Flag::OneVortex) && found.vortex(Side::Right).is_none(),
         "{:?}",
@@ -332,8 +319,7 @@ fn vortices_beyond_or_at_the_end_of_the_sector_are_told() {
         Velocities::Means,
         &options,
     )
-    .unwrap()
-    .result;
+    .unwrap();
     assert!(
         found.has(Flag::AtEdge) && found.vortices.len() == 2,
         "{:?}",
@@ -354,7 +340,7 @@ fn folded_velocities_holes_and_cores_that_are_kept() {
     map.velocity_m_s
         .slice_mut(ndarray::s![20..24, 3..9])
         .fill(f64::NAN);
-    let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
+    let found = fit_scan(&map, Velocities::Means, &options).unwrap();
     let (p, truth) = (found.wake.unwrap().to_array(), wake.to_array());
     assert!(
         (0..PARAMETERS).all(|i| (p[i] - truth[i]).powi(2) <= 16.0 * found.covariance[[i, i]]),
@@ -374,8 +360,7 @@ fn folded_velocities_holes_and_cores_that_are_kept() {
             ..options
         },
     )
-    .unwrap()
-    .result;
+    .unwrap();
     assert!(kept.has(Flag::CoreKept) && kept.vortices.iter().all(|v| v.core_radius_m.is_none()));
     assert_eq!(kept.wake.unwrap().left.core_radius_m, 2.2);
 }
@@ -453,7 +438,7 @@ fn impossible_scans_and_options_are_refused_with_the_field() {
         "deviation_m_s",
     );
     assert_eq!(
-        fit_scan(&map, Velocities::Means, &options).unwrap().result,
-        fit_scan(&map, Velocities::Means, &options).unwrap().result
+        fit_scan(&map, Velocities::Means, &options).unwrap(),
+        fit_scan(&map, Velocities::Means, &options).unwrap()
     );
 }

@@ -175,9 +175,7 @@ impl Scatter {
                 velocity_m_s: draw(case, &mut rng),
                 ..case.map.clone()
             };
-            let found = fit_scan(&map, Velocities::Means, &case.options)
-                .unwrap()
-                .result;
+            let found = fit_scan(&map, Velocities::Means, &case.options).unwrap();
             if found.vortices.len() < 2 {
                 scatter.failed.push((seed, found));
                 continue;

@@ -97,9 +97,7 @@ fn radial_velocities_have_the_errors_of_the_stored_table() {
         ];
         if z == 1.0 {
             cases.push((
-                fit_scan(&map, Velocities::Means, &options(false))
-                    .unwrap()
-                    .result,
+                fit_scan(&map, Velocities::Means, &options(false)).unwrap(),
                 [1.1, 5.6],
                 2.0,
             ));

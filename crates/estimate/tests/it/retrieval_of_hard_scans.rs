@@ -24,8 +24,7 @@ fn long_gates_hide_circulations_but_no_wakes() {
             Velocities::Means,
             &options(37.0),
         )
-        .unwrap()
-        .result;
+        .unwrap();
         // the gate is taken for too long: what that leaves is alike in neighbours, and counted as such
         assert!(
             found.statistic > 100.0 && found.vortices.len() == 2,
@@ -70,7 +69,7 @@ fn vortices_in_gates_that_do_not_resolve_a_pair_are_ambiguous() {
         ]);
         for seed in 2..5 {
             let map = noisy(&wake, &options, (0.05, 0.004, 26), (480.0, 12.0, 21), seed);
-            let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
+            let found = fit_scan(&map, Velocities::Means, &options).unwrap();
             lone += usize::from(found.has(Flag::OneVortex));
             let is_unambiguous = !found.vortices.is_empty() && !found.has(Flag::Ambiguous);
             assert!(!is_unambiguous, "{spacing_m} {seed}: {found:?}");
@@ -105,8 +104,7 @@ fn standing_vortices_are_taken_for_such_and_moving_ones_in_scans_of_seconds() {
                 Velocities::Means,
                 &case.options,
             )
-            .unwrap()
-            .result;
+            .unwrap();
             assert_eq!(
                 found.has(Flag::MotionIgnored),
                 !moves,
@@ -146,9 +144,7 @@ fn velocities_that_share_windows_with_their_neighbours_are_not_counted_as_indepe
             map
         };
         let begin = std::time::Instant::now();
-        let empty = fit_scan(&map(&calm, 0.5), Velocities::Means, &options)
-            .unwrap()
-            .result;
+        let empty = fit_scan(&map(&calm, 0.5), Velocities::Means, &options).unwrap();
         println!(
             "{seed}: {:.1} {:?} {:.2} s",
             empty.statistic,
@@ -159,9 +155,7 @@ fn velocities_that_share_windows_with_their_neighbours_are_not_counted_as_indepe
         largest = largest.max(empty.statistic);
         if seed < 2 {
             let begin = std::time::Instant::now();
-            let found = fit_scan(&map(&wake, 0.3), Velocities::Means, &options)
-                .unwrap()
-                .result;
+            let found = fit_scan(&map(&wake, 0.3), Velocities::Means, &options).unwrap();
             println!(
                 "{:.1} {:?} {:.2} s",
                 found.statistic,
@@ -189,7 +183,7 @@ fn scans_without_noise_and_scans_of_another_unit_have_an_answer() {
         let mut map = noisy(&wake, &options, (0.06, 4e-3, 40), (330.0, 5.0, 30), 1);
         map.velocity_m_s = expected_velocities(&map, &options, &wake, false).unwrap() * unit;
         map.sigma_m_s = None;
-        let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
+        let found = fit_scan(&map, Velocities::Means, &options).unwrap();
         println!("{unit}: {:?} {:?}", found.flags, found.wake);
         let left = found.vortex(Side::Left).unwrap();
         let off = left.circulation_m2_s.value / unit - 400.0;
@@ -238,7 +232,7 @@ fn times_of_fits() {
                     3,
                 );
                 let begin_s = processor_s();
-                let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
+                let found = fit_scan(&map, Velocities::Means, &options).unwrap();
                 let taken_s = processor_s() - begin_s;
                 let fitted = found
                     .vortices
@@ -297,7 +291,7 @@ fn errors_over_deviations(
                 (250.0, 300.0 / f64::from(cells.1), cells.1),
                 seed,
             );
-            let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
+            let found = fit_scan(&map, Velocities::Means, &options).unwrap();
             for (vortex, lateral_m) in found.vortices.iter().zip([a, b]) {
                 let over = |number: Measured, truth: f64| (number.value - truth) / number.std;
                 circulations.push(over(vortex.circulation_m2_s, circulation));
@@ -363,7 +357,7 @@ fn the_profile_of_the_cores_is_part_of_the_deviations_unless_it_is_stated() {
                     other_profile,
                     ..made.clone()
                 };
-                let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
+                let found = fit_scan(&map, Velocities::Means, &options).unwrap();
                 let over = |v: &VortexResult| {
                     (v.circulation_5_15_m2_s.value - truth) / v.circulation_5_15_m2_s.std
                 };

@@ -94,8 +94,7 @@ pub(crate) fn empty_statistics(
             Velocities::Means,
             options,
         )
-        .unwrap()
-        .result;
+        .unwrap();
         if found.vortices.is_empty() {
             -found.statistic
         } else {

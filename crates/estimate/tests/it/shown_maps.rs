@@ -35,13 +35,12 @@ fn fitted<T>(
     )
     .unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-    let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
     let new = || {
         EstimatorResponse::new(
             &statistic,
             &peak,
             &sampling,
-            &pulse,
+            SIGMA_S,
             (Noise::White, 10.0),
             2.0,
         )
@@ -170,12 +169,11 @@ fn cores_that_shrink_on_the_way_are_fitted_where_it_ends() {
     )
     .unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-    let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
     let response = EstimatorResponse::new(
         &statistic,
         &peak,
         &sampling,
-        &pulse,
+        SIGMA_S,
         (Noise::White, 10.0),
         2.0,
     )
@@ -344,7 +342,7 @@ fn one_vortex_alone_is_fitted_with_its_core() {
     map.velocity_m_s = expected_velocities(&map, &options, &truth, false).unwrap();
     map.velocity_m_s
         .mapv_inplace(|v| v + 0.2 * crate::fixtures::normal(&mut rng));
-    let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
+    let found = fit_scan(&map, Velocities::Means, &options).unwrap();
     let [vortex] = &found.vortices[..] else {
         panic!("{found:?}")
     };

@@ -8,8 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_estimate::vortex_fit::{
     CoreProfile, EstimatorResponse, FreeParameters, Loss, MapFit, MapFitOptions, Parameter, Powers,
-    PulseShape, RangeKernel, ScanModel, ScanSetup, Sharing, SignalFitOptions, Starts, VelocityMap,
-    Wake, WakeModel, WindFit, fit_map, fit_map_of_estimator, fit_signals,
+    RangeKernel, ScanModel, ScanSetup, Sharing, SignalFitOptions, Starts, VelocityMap, Wake,
+    WakeModel, WindFit, fit_map, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
     Correlogram, Error, Refinement, Sampling, SignalKind, SpectralPeak, Weighting, bound::Noise,
@@ -131,12 +131,11 @@ fn exact_maps_of_peaks_give_the_wake_back_where_means_mislead() {
     )
     .unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, 64).unwrap();
-    let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
     let shown = EstimatorResponse::new(
         &statistic,
         &peak,
         &sampling,
-        &pulse,
+        SIGMA_S,
         (Noise::White, 1.0),
         2.0,
     )
@@ -190,12 +189,11 @@ fn a_core_that_the_regions_do_not_resolve_keeps_the_least_radius_and_says_so() {
     )
     .unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-    let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
     let shown = EstimatorResponse::new(
         &statistic,
         &peak,
         &sampling,
-        &pulse,
+        SIGMA_S,
         (Noise::White, 1.0),
         4.0,
     )
@@ -382,7 +380,7 @@ fn scan(
         sampling: Sampling::baseband(50e6, 1.55e-6, 50e6).unwrap(),
         kind: SignalKind::Complex,
         noise: Noise::White,
-        pulse: PulseShape::gaussian(SIGMA_S).unwrap(),
+        pulse_sigma_s: SIGMA_S,
         wake: WakeModel::default(),
         elevation_rad: (0..lines)
             .map(|i| first_rad + step_rad * f64::from(i))

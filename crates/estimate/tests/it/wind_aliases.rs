@@ -65,7 +65,7 @@ fn a_wind_of_several_intervals_is_found_in_any_sector() {
             let what = format!("{wind_m_s} m/s at {elevations:?}");
             let wake = wake(400.0, lateral_m, wind_m_s);
             let map = map(&wake, elevations, range_m, seed);
-            let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
+            let found = fit_scan(&map, Velocities::Means, &options).unwrap();
             wind_is(&found, wind_m_s, &what);
             assert!(
                 !found.has(Flag::Ambiguous) && found.vortices.len() == 2,
@@ -92,7 +92,7 @@ fn a_wind_without_a_wake_is_found_beyond_the_interval_too() {
     for (wind_m_s, seed) in [(12.0, 1), (-20.0, 2)] {
         let calm = wake(0.0, [400.0, 440.0], wind_m_s);
         let map = map(&calm, [3.0, 30.0, 0.5], [320.0, 520.0], seed);
-        let found = fit_scan(&map, Velocities::Means, &options).unwrap().result;
+        let found = fit_scan(&map, Velocities::Means, &options).unwrap();
         assert!(
             found.has(Flag::NoWake) && !found.has(Flag::Ambiguous),
             "{found:?}"
@@ -108,9 +108,7 @@ fn a_wind_without_a_wake_is_found_beyond_the_interval_too() {
 fn winds_that_a_sector_does_not_tell_apart_are_ambiguous() {
     let wake = wake(400.0, [1600.0, 1640.0], 3.0);
     let map = map(&wake, [1.2, 3.2, 0.05], [1540.0, 1700.0], 7);
-    let found = fit_scan(&map, Velocities::Means, &RetrievalOptions::default())
-        .unwrap()
-        .result;
+    let found = fit_scan(&map, Velocities::Means, &RetrievalOptions::default()).unwrap();
     assert!(found.has(Flag::Ambiguous), "{:?}", found.flags);
     let winds: Vec<f64> = found
         .tops

@@ -54,7 +54,7 @@ fn turbulence(
         Some(_) => fit_scan(map, Velocities::Means, &options),
         None => fit_scan(&with_unit_noise(map), Velocities::Means, &options),
     };
-    Ok(fit?.result.turbulence)
+    Ok(fit?.turbulence)
 }
 
 /// The map with a noise of 1 m/s, where it is found with the turbulence.

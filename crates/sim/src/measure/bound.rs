@@ -118,14 +118,14 @@ impl<'p> Setting<'p> {
         // Each record is about its innermost window, with which rows of windows begin: ends of the scan cut chords. Most chords share one.
         let mut about = BTreeMap::new();
         let mut of_region = 0.0;
-        for chord in self.places.chords(self.point(range_m), radius_m) {
-            let innermost = (chord.first + chord.last) / 2;
+        for (line, gates) in self.places.chords(self.point(range_m), radius_m) {
+            let innermost = (gates.start + gates.end - 1) / 2;
             let by_gates = match about.entry(innermost) {
                 Entry::Occupied(known) => known.into_mut(),
                 Entry::Vacant(place) => place.insert(rays.at(gates_m[innermost], most)?),
             };
-            let pulses = self.places.line_rays(chord.line).count();
-            of_region += pulses as f64 * by_gates[chord.gates().min(most) - 1];
+            let pulses = self.places.line_rays(line).count();
+            of_region += pulses as f64 * by_gates[gates.len().min(most) - 1];
         }
         let ratios = [
             interpolate(&rays.layer_m, &rays.layer_snr, range_m),

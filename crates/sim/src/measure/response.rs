@@ -13,13 +13,13 @@ use crate::scene::{Scene, SceneFile};
 use wakescope_estimate::Radius;
 use wakescope_estimate::bound::Noise;
 use wakescope_estimate::retrieval::ScanEstimator;
-use wakescope_estimate::vortex_fit::{EstimatorResponse, PulseShape, ScanSetup, WakeModel};
+use wakescope_estimate::vortex_fit::{EstimatorResponse, ScanSetup, WakeModel};
 
 /// Pulse, noise and signal-to-noise ratio of a scene's signals, and the estimator of its maps.
 pub struct SceneResponse {
     pub(crate) scene: Scene,
     response: Option<Response>,
-    pulse: PulseShape,
+    pulse_sigma_s: f64,
     noise: Noise,
     /// Mean square of a sample of noise, A^2.
     pub(crate) noise_power_a2: f64,
@@ -53,12 +53,11 @@ impl SceneResponse {
         let response = response(scene, pulse, median_snr(&layer_snr))
             .ok()
             .flatten();
-        let pulse = PulseShape::gaussian(pulse.sigma_s())?;
         let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();
         Ok(Some(Self {
             scene: scene.clone(),
             response,
-            pulse,
+            pulse_sigma_s: pulse.sigma_s(),
             noise,
             noise_power_a2,
             layer_snr,
@@ -91,7 +90,7 @@ impl SceneResponse {
             sampling: scene.sampling()?,
             kind: scene.signal_kind(),
             noise: self.noise,
-            pulse: self.pulse.clone(),
+            pulse_sigma_s: self.pulse_sigma_s,
             wake,
             elevation_rad,
             first_sample_time_s: 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S,
@@ -110,7 +109,7 @@ impl ScanEstimator for SceneResponse {
             correlogram,
             &**estimator,
             &sampling,
-            &self.pulse,
+            self.pulse_sigma_s,
             noise,
             0.0,
         )

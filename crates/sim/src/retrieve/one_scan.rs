@@ -12,7 +12,7 @@ use crate::scene::{RetrievalMethod as Method, RetrievalTurbulence, Scene, SceneF
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use std::path::Path;
 use wakescope_estimate::retrieval::{
-    Gate, RetrievalOptions, ScanFit, Turbulence, Velocities, fit_scan, radial_velocity_method,
+    Gate, RetrievalOptions, Turbulence, Velocities, fit_scan, radial_velocity_method,
     without_implausible_vortices,
 };
 use wakescope_estimate::vortex_fit::{CorePrior, RangeKernel, Sharing, WakeModel};
@@ -160,16 +160,13 @@ pub fn retrieve_map(
     velocities: Velocities<'_>,
 ) -> Result<(RetrievedScan, Option<String>), Error> {
     let fitted = if method == Method::Rv {
-        radial_velocity_method(&scan.map, &options).map(|result| ScanFit {
-            result,
-            model: options.model,
-        })
+        radial_velocity_method(&scan.map, &options)
     } else {
         fit_scan(&scan.map, velocities, &options)
     };
-    let ScanFit { mut result, model } = fitted.map_err(|error| refused(&scan, &error))?;
-    options.model = model;
-    let reason = without_implausible_vortices(&mut result, &scan.map, &model);
+    let mut result = fitted.map_err(|error| refused(&scan, &error))?;
+    options.model = result.model;
+    let reason = without_implausible_vortices(&mut result, &scan.map, &options.model);
     let found = RetrievedScan {
         scan,
         options,

@@ -67,12 +67,8 @@ pub(super) fn likely_filter(
     for decay_per_s3 in DECAY_DENSITIES_PER_S3 {
         let away = (decay_per_s3.log10() - LOG10_DECAY_DENSITY) / LOG10_DECAY_DENSITY_STD;
         for walk_per_s in WALKS_PER_S {
-            let densities = Densities {
-                acceleration_m2_s3,
-                decay_per_s3,
-                walk_per_s,
-            };
-            let filter = Filter::over(results, times_s, densities)?;
+            let filter =
+                Filter::new(acceleration_m2_s3, decay_per_s3, walk_per_s).over(results, times_s)?;
             let posterior = filter.log_likelihood - 0.5 * away * away;
             if best.as_ref().is_none_or(|(most, _)| posterior > *most) {
                 best = Some((posterior, filter));
@@ -82,17 +78,6 @@ pub(super) fn likely_filter(
     best.map(|(_, filter)| filter).ok_or(Error::Empty {
         field: "densities of a track",
     })
-}
-
-/// Spectral densities of what moves and weakens vortices.
-#[derive(Clone, Copy)]
-pub(super) struct Densities {
-    /// Of the acceleration.
-    pub(super) acceleration_m2_s3: f64,
-    /// Of the changes of the rate of decay.
-    pub(super) decay_per_s3: f64,
-    /// Of a random walk of ln Gamma.
-    pub(super) walk_per_s: f64,
 }
 
 /// How far detections are from their prediction.
@@ -108,8 +93,14 @@ struct Innovation {
 const INNOVATION: &str = "covariance of the innovation";
 
 /// A filter through the scans of a track.
+#[derive(Default)]
 pub(super) struct Filter {
-    pub(super) densities: Densities,
+    /// Spectral density of the acceleration.
+    acceleration_m2_s3: f64,
+    /// That of the changes of the rate of decay.
+    pub(super) decay_per_s3: f64,
+    /// That of a random walk of ln Gamma.
+    pub(super) walk_per_s: f64,
     pub(super) steps: Vec<Step>,
     misses: [usize; 2],
     pub(super) innovations: Vec<f64>,
@@ -119,20 +110,19 @@ pub(super) struct Filter {
 }
 
 impl Filter {
+    /// The filter before the first scan, with the spectral densities of the acceleration, of the
+    /// changes of the rate of decay and of a random walk of ln Gamma.
+    pub(super) fn new(acceleration_m2_s3: f64, decay_per_s3: f64, walk_per_s: f64) -> Self {
+        Self {
+            acceleration_m2_s3,
+            decay_per_s3,
+            walk_per_s,
+            ..Self::default()
+        }
+    }
+
     /// The filter after all scans.
-    pub(super) fn over(
-        results: &[&ScanResult],
-        times_s: &[f64],
-        densities: Densities,
-    ) -> Result<Self, Error> {
-        let mut filter = Self {
-            densities,
-            steps: vec![],
-            misses: [0; 2],
-            innovations: vec![],
-            rejected: 0,
-            log_likelihood: 0.0,
-        };
+    pub(super) fn over(mut self, results: &[&ScanResult], times_s: &[f64]) -> Result<Self, Error> {
         for (k, result) in results.iter().enumerate() {
             let seconds = if k > 0 {
                 times_s[k] - times_s[k - 1]
@@ -140,9 +130,9 @@ impl Filter {
                 0.0
             };
             let soon = &results[k + 1..results.len().min(k + BIRTH)];
-            filter.step(result, soon, seconds)?;
+            self.step(result, soon, seconds)?;
         }
-        Ok(filter)
+        Ok(self)
     }
 
     /// Prediction to the next scan; a vortex that does not live is forgotten.
@@ -150,11 +140,12 @@ impl Filter {
         let mut transition = Array2::eye(BOTH);
         let mut noise = Array2::zeros((BOTH, BOTH));
         for (i, alive) in alive.into_iter().enumerate() {
-            let Densities {
+            let Self {
                 acceleration_m2_s3,
                 decay_per_s3,
                 walk_per_s,
-            } = self.densities;
+                ..
+            } = *self;
             for (place, sign, density, walk) in [
                 (0, 1.0, acceleration_m2_s3, 0.0),
                 (2, 1.0, acceleration_m2_s3, 0.0),

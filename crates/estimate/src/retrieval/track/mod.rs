@@ -131,8 +131,8 @@ pub fn track(results: &[&ScanResult], acceleration_density_m2_s3: f64) -> Result
         points: points.collect(),
         mean_innovation: filter.innovations.iter().sum::<f64>() / count,
         rejected: filter.rejected,
-        decay_density_per_s3: filter.densities.decay_per_s3,
-        circulation_walk_per_s: filter.densities.walk_per_s,
+        decay_density_per_s3: filter.decay_per_s3,
+        circulation_walk_per_s: filter.walk_per_s,
     })
 }
 

@@ -1,4 +1,4 @@
-use super::filter::{Densities, Filter};
+use super::filter::Filter;
 use super::*;
 use crate::retrieval::VortexResult;
 use ndarray::Array2;
@@ -89,12 +89,9 @@ fn smoothed_errors_m2_s(circulation_std_m2_s: f64) -> [f64; 2] {
         let (results, truth) = two_phases(circulation_std_m2_s, &mut rng);
         let results: Vec<&ScanResult> = results.iter().collect();
         let times_s: Vec<f64> = results.iter().map(|r| r.reference_time_s).collect();
-        let fixed = Densities {
-            acceleration_m2_s3: Track::ACCELERATION_DENSITY_M2_S3,
-            decay_per_s3: 1e-7,
-            walk_per_s: 0.0,
-        };
-        let fixed = Filter::over(&results, &times_s, fixed).unwrap();
+        let fixed = Filter::new(Track::ACCELERATION_DENSITY_M2_S3, 1e-7, 0.0)
+            .over(&results, &times_s)
+            .unwrap();
         let states = fixed.smoothed().unwrap();
         let found = track(&results, Track::ACCELERATION_DENSITY_M2_S3).unwrap();
         for (k, truth_m2_s) in truth.iter().enumerate() {
@@ -164,6 +161,7 @@ fn scan(k: usize, wake: &Wake, rng: &mut Xoshiro256PlusPlus) -> ScanResult {
         flags: vec![],
         tops: vec![],
         turbulence: None,
+        model: crate::vortex_fit::WakeModel::default(),
     }
 }
 

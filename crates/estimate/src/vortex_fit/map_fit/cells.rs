@@ -14,6 +14,12 @@ pub(crate) struct Cell {
     pub(crate) sigma_m_s: f64,
 }
 
+/// Residuals and, by free number, slopes of the expected velocities, both over their deviations and white.
+pub(crate) struct Rows {
+    pub(crate) residuals: Vec<f64>,
+    pub(crate) slopes: Vec<Vec<f64>>,
+}
+
 /// The velocities that there are, each with its stated deviation.
 pub(crate) fn cells(map: &VelocityMap<'_>) -> Vec<Cell> {
     let mut cells = Vec::new();

@@ -137,21 +137,16 @@ pub fn fit_secondary_vortices(
         |thinned| thinned.setting().with_secondary(pair),
     );
     let Some(found) = found else { return Ok(None) };
-    if !found.secondary.fitted {
-        return Ok(Some((None, found.secondary)));
+    if !found.fitted {
+        return Ok(Some((None, found)));
     }
     let model = WakeModel {
-        secondary: Some(found.secondary.vortices),
+        secondary: Some(found.vortices),
         ..*model
     };
     let fit = refine_map_fit_of_estimator(map, &model, response, &found.wake, options)?;
-    Ok(Some((
-        Some(MapFit {
-            covariance: found.covariance,
-            ..fit
-        }),
-        found.secondary,
-    )))
+    let covariance = found.covariance.clone();
+    Ok(Some((Some(MapFit { covariance, ..fit }), found)))
 }
 
 /// The same pair with the circulation of each vortex from what is near it, in a wind of its own, where that explains the map clearly better: what
@@ -404,7 +399,6 @@ mod tests {
     use crate::estimators::{Refinement, SpectralPeak};
     use crate::spectrum::Correlogram;
     use crate::spectrum::unweighted_lags;
-    use crate::vortex_fit::PulseShape;
     use crate::window::{Sampling, SignalKind, Weighting};
 
     /// Slopes at every few lines and gates, linear between, against difference quotients at all places.
@@ -420,12 +414,11 @@ mod tests {
         )
         .unwrap();
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-        let pulse = PulseShape::gaussian(120e-9).unwrap();
         let response = EstimatorResponse::new(
             &statistic,
             &peak,
             &sampling,
-            &pulse,
+            120e-9,
             (Noise::White, 1.0),
             2.0,
         )

@@ -25,8 +25,9 @@ use crate::spectrum::{Correlogram, Taper};
 use crate::vortex_fit::map_fit::cells::scaled;
 use crate::vortex_fit::wake::motion::Motion;
 use crate::vortex_fit::wake::pair::Ray;
+use crate::vortex_fit::wake::pulse::{envelope_at, reach_s};
 use crate::vortex_fit::wake::wake_map::region;
-use crate::vortex_fit::{PulseShape, RangeKernel, Wake, WakeModel};
+use crate::vortex_fit::{RangeKernel, Wake, WakeModel};
 use crate::window::{SPEED_OF_LIGHT_M_S, Sample, Sampling, Scratch, SignalKind};
 
 /// Air nodes are at most this far apart \[m\]: half of a small core.
@@ -52,7 +53,8 @@ pub struct EstimatorResponse<'a> {
     kind: SignalKind,
     tapers: Vec<Taper>,
     sampling: Sampling,
-    pulse: PulseShape,
+    /// Half-width of the power of the pulse at 1/e \[s\].
+    pulse_sigma_s: f64,
     /// Lags of the noise over the power of the signal.
     noise: Vec<f64>,
     /// Radius of the region at a range \[m\].
@@ -63,8 +65,8 @@ pub struct EstimatorResponse<'a> {
 
 impl<'a> EstimatorResponse<'a> {
     /// Of a map that `estimator` made of the correlograms `statistic`, accumulated over regions of radius `radius_m`
-    /// \[m\] (0: each line for itself), with a backscatter that changes little along a gate. `snr` is the
-    /// signal-to-noise ratio in the detector band.
+    /// \[m\] (0: each line for itself), with a backscatter that changes little along a gate. `pulse_sigma_s` is the
+    /// half-width of the power of the Gaussian pulse at 1/e \[s\], `snr` the signal-to-noise ratio in the detector band.
     ///
     /// # Errors
     /// [`Error::Length`] if statistic and estimator do not match; [`Error::OutOfRange`], [`Error::Band`] for impossible
@@ -73,12 +75,13 @@ impl<'a> EstimatorResponse<'a> {
         statistic: &Correlogram<S>,
         estimator: &'a dyn Estimator,
         sampling: &Sampling,
-        pulse: &PulseShape,
+        pulse_sigma_s: f64,
         (noise, snr): (Noise, f64),
         radius_m: f64,
     ) -> Result<Self, Error> {
         sampling.validate_for(S::KIND)?;
         noise.validate()?;
+        positive("pulse_sigma_s", pulse_sigma_s)?;
         positive("snr", snr)?;
         let lags = statistic.lags();
         length(
@@ -103,7 +106,7 @@ impl<'a> EstimatorResponse<'a> {
             kind: S::KIND,
             tapers: statistic.tapers().to_vec(),
             sampling: *sampling,
-            pulse: pulse.clone(),
+            pulse_sigma_s,
             noise: numbers.collect(),
             radius_m: Box::new(move |_| radius_m),
             line_times: Vec::new(),
@@ -171,8 +174,8 @@ impl<'a> EstimatorResponse<'a> {
         let lags = self.tapers[0].weights.len();
         let numbers = self.kind.lag_numbers(lags);
         let half_s = 0.5 * lags as f64 * self.sampling.period_s();
-        let reach =
-            (0.5 * SPEED_OF_LIGHT_M_S * (half_s + self.pulse.reach_s()) / spacing_m).ceil() as i64;
+        let reach = (0.5 * SPEED_OF_LIGHT_M_S * (half_s + reach_s(self.pulse_sigma_s)) / spacing_m)
+            .ceil() as i64;
         let mut weights = Vec::with_capacity((2 * reach + 1) as usize * numbers);
         for node in -reach..=reach {
             let away_s = 2.0 * node as f64 * spacing_m / SPEED_OF_LIGHT_M_S;
@@ -227,7 +230,7 @@ impl<'a> EstimatorResponse<'a> {
     fn node_spacing_m(&self, range_m: &[f64], coarser: f64) -> f64 {
         let gaps_m = range_m.windows(2).map(|pair| pair[1] - pair[0]);
         let gap_m = gaps_m.fold(f64::INFINITY, f64::min);
-        let of_pulse_m = NODE_OVER_PULSE * 0.5 * SPEED_OF_LIGHT_M_S * self.pulse.sigma_s;
+        let of_pulse_m = NODE_OVER_PULSE * 0.5 * SPEED_OF_LIGHT_M_S * self.pulse_sigma_s;
         let widest_m = coarser * NODE_M.min(of_pulse_m);
         if gap_m.is_finite() && gap_m > 0.25 * widest_m {
             gap_m / (gap_m / widest_m).ceil()
@@ -242,7 +245,7 @@ impl<'a> EstimatorResponse<'a> {
         let period_s = self.sampling.period_s();
         let half_s = 0.5 * lags as f64 * period_s;
         let pulse: Vec<f64> = (0..lags)
-            .map(|n| self.pulse.at(n as f64 * period_s - half_s - away_s))
+            .map(|n| envelope_at(self.pulse_sigma_s, n as f64 * period_s - half_s - away_s))
             .collect();
         let mut tapered: Vec<Vec<f64>> = Vec::new();
         for taper in &self.tapers {
@@ -510,8 +513,7 @@ mod tests {
         noise: (Noise, f64),
         radius_m: f64,
     ) -> EstimatorResponse<'a> {
-        let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
-        EstimatorResponse::new(statistic, estimator, &sampling(), &pulse, noise, radius_m).unwrap()
+        EstimatorResponse::new(statistic, estimator, &sampling(), SIGMA_S, noise, radius_m).unwrap()
     }
 
     /// Regions of one line share no noise, regions of all lines share all of it.
@@ -575,12 +577,11 @@ mod tests {
         let statistic =
             Correlogram::<num_complex::Complex<f64>>::new(Weighting::Rectangular, 64).unwrap();
         let pair = PulsePair::new(&sampling, SignalKind::Complex, &unweighted_lags(64)).unwrap();
-        let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
         let response = EstimatorResponse::new(
             &statistic,
             &pair,
             &sampling,
-            &pulse,
+            SIGMA_S,
             (Noise::White, 10.0),
             2.0,
         )
@@ -708,10 +709,9 @@ mod tests {
             Refinement::Parabola,
         )
         .unwrap();
-        let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
         let new = |estimator: &SpectralPeak, snr, radius_m| {
             let noise = (Noise::White, snr);
-            EstimatorResponse::new(&statistic, estimator, &sampling(), &pulse, noise, radius_m)
+            EstimatorResponse::new(&statistic, estimator, &sampling(), SIGMA_S, noise, radius_m)
                 .map(|_| ())
         };
         assert!(matches!(new(&short, 1.0, 2.0), Err(Error::Length { .. })));

@@ -16,10 +16,10 @@ use crate::linalg::positive_definite::{inverse, singular, solve};
 use crate::parallel::map_each;
 use crate::retrieval::Whitening;
 use crate::vortex_fit::levenberg_marquardt::{Minimum, Normal, StoppingRule, levenberg_marquardt};
-use crate::vortex_fit::map_fit::cells::{Cell, products, scaled};
+use crate::vortex_fit::map_fit::cells::{Cell, Rows, products, scaled};
 use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::map_fit::prediction::Prediction;
-use crate::vortex_fit::map_fit::residual_covariance::{Cells, decaying, of_neighbours};
+use crate::vortex_fit::map_fit::residual_covariance::{decaying, of_neighbours};
 use crate::vortex_fit::wake::core_prior::secondary_terms;
 use crate::vortex_fit::wake::free_parameters::{spread, stepped};
 use crate::vortex_fit::{CorePrior, Loss, PARAMETERS, PairPrior, Wake};
@@ -38,12 +38,6 @@ pub(crate) struct LeastSquares<'a> {
     pub(crate) pair_prior: Option<PairPrior>,
     /// Velocities that count as one: as the losses of all of them are added up, so many times what is known before must count.
     pub(crate) counted: f64,
-}
-
-/// Residuals and, by free number, slopes of the expected velocities, both over their deviations and white.
-pub(crate) struct Rows {
-    pub(crate) residuals: Vec<f64>,
-    pub(crate) slopes: Vec<Vec<f64>>,
 }
 
 /// Where the covariance of the gradient comes from.
@@ -241,18 +235,11 @@ impl LeastSquares<'_> {
 
     /// Velocities that count as one, from the correlation of the residuals over at most so many lines.
     pub(crate) fn alike(&self, p: &[f64], lines: usize) -> f64 {
-        let residuals = self.rows(p, &[]).residuals;
-        let weighted: Vec<f64> = residuals.iter().map(|r| self.loss.at(*r).1 * r).collect();
-        of_neighbours(
-            Cells {
-                cells: &self.cells,
-                residuals: &weighted,
-                slopes: &[],
-            },
-            &Array2::zeros((0, 0)),
-            lines,
-        )
-        .1
+        let mut rows = self.rows(p, &[]);
+        for residual in &mut rows.residuals {
+            *residual *= self.loss.at(*residual).1;
+        }
+        of_neighbours(&self.cells, &rows, &Array2::zeros((0, 0)), lines).1
     }
 
     /// What the map tells of the free numbers at a minimum.
@@ -262,7 +249,7 @@ impl LeastSquares<'_> {
         groups: &'g [Vec<usize>],
         from: Scores<'_>,
     ) -> Result<Uncertainty<'g>, Error> {
-        let rows = self.rows(p, groups);
+        let mut rows = self.rows(p, groups);
         let losses: Vec<_> = rows.residuals.iter().map(|r| self.loss.at(*r)).collect();
         let (weights, curved): (Vec<f64>, Vec<f64>) = losses
             .iter()
@@ -288,15 +275,12 @@ impl LeastSquares<'_> {
         if inverse(CURVATURE, &a).is_err() {
             a = products(&weights, &rows.slopes) + &of_known;
         }
-        let weighted = scaled(&weights, &rows.residuals);
-        let all = Cells {
-            cells: &self.cells,
-            residuals: &weighted,
-            slopes: &rows.slopes,
-        };
+        rows.residuals = scaled(&weights, &rows.residuals);
         let (scores, alike) = match from {
-            Scores::OfNeighbours { lines } => of_neighbours(all, &inverse(CURVATURE, &a)?, lines),
-            Scores::Decaying { blocks } => decaying(all, blocks),
+            Scores::OfNeighbours { lines } => {
+                of_neighbours(&self.cells, &rows, &inverse(CURVATURE, &a)?, lines)
+            }
+            Scores::Decaying { blocks } => decaying(&self.cells, &rows, blocks),
             Scores::Correlated(covariance) => (of_pairs(&curved, &rows.slopes, covariance), 1.0),
             Scores::Stated => (a.clone(), 1.0),
         };

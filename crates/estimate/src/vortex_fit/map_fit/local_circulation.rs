@@ -10,7 +10,8 @@ use ndarray::{Array2, s};
 use crate::linalg::positive_definite::inverse;
 use crate::vortex_fit::levenberg_marquardt::StoppingRule;
 use crate::vortex_fit::map_fit::least_squares::{CURVATURE, LeastSquares, Scores, submatrix};
-use crate::vortex_fit::map_fit::setting::{Linear, Setting};
+use crate::vortex_fit::map_fit::prediction::Linear;
+use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::{MapFit, Parameter, Sharing, Wake};
 
 /// How far what is near a vortex reaches: the circle of 15 m over which circulations are averaged, and some more \[m\].
@@ -49,7 +50,7 @@ impl Setting<'_, '_> {
             lines: self.options.correlated_lines,
         };
         Some(Local {
-            circulation_m2_s: best.tangent.at[CIRCULATIONS[side] as usize],
+            circulation_m2_s: best.at[CIRCULATIONS[side] as usize],
             variance: self.local_variance(&best, side, scores)?,
             gain: self.gain(&best, &alone),
         })
@@ -69,7 +70,7 @@ impl Setting<'_, '_> {
         let groups = [vec![own], vec![Parameter::Wind as usize]];
         let start = pair.to_array().to_vec();
         let best = self.settled(start, &groups, stop, None).ok()?;
-        (best.cells.len() >= FEWEST && best.tangent.at[own] > 0.0).then_some(best)
+        (best.cells.len() >= FEWEST && best.at[own] > 0.0).then_some(best)
     }
 
     /// Variance of the circulation of one vortex from what is near it \[m⁴/s²\].
@@ -81,7 +82,7 @@ impl Setting<'_, '_> {
     ) -> Option<f64> {
         let own = CIRCULATIONS[side] as usize;
         let squares = self.about(best);
-        let uncertainty = squares.uncertainty(&best.tangent.at, &best.groups, scores);
+        let uncertainty = squares.uncertainty(&best.at, &best.groups, scores);
         Some(uncertainty.ok()?.covariance(|_| true).ok()?[[own, own]])
     }
 }
@@ -101,7 +102,7 @@ impl Setting<'_, '_> {
                 all.push(group.clone());
             }
         }
-        let p = &best.tangent.at;
+        let p = &best.at;
         let linear = self.linear(p, &all, None).ok()?;
         let squares = LeastSquares {
             prior: None,

@@ -2,10 +2,11 @@
 //!
 //! The parameters are a list: the ten of a wake and, if secondary vortices are fitted, those of each. What
 //! gates show in the mean ([`Gates`](crate::vortex_fit::map_fit::gates::Gates)) and what an estimator shows have no more in common than this
-//! trait; of the latter, least squares see the [`Tangent`]. Check: fits of exact maps; difference quotients.
+//! trait; of the latter, least squares see the [`Linear`]. Check: fits of exact maps; difference quotients.
 
 use ndarray::{Array2, Zip};
 
+use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::wake::free_parameters::stepped;
 use crate::vortex_fit::wake::pair::SECONDARY_PARAMETERS;
 use crate::vortex_fit::{PARAMETERS, Wake};
@@ -95,15 +96,30 @@ pub(crate) fn near(a: &[f64], b: &[f64]) -> bool {
     (0..a.len()).all(|place| (b[place] - a[place]).abs() <= NEAR * step(a, place))
 }
 
-/// A model to first order about `at`.
-pub(crate) struct Tangent {
+/// A model to first order about `at`, with the deviations that the residuals tell there.
+pub(crate) struct Linear {
     pub(crate) at: Vec<f64>,
     pub(crate) here: Predicted,
-    /// Where its slopes were taken, which is near.
+    /// Where the slopes were taken.
     pub(crate) slopes_at: Vec<f64>,
+    /// Its free numbers.
+    pub(crate) groups: Vec<Vec<usize>>,
+    pub(crate) cells: Vec<Cell>,
+    /// Of the residuals over the stated deviations in uniform wind.
+    pub(crate) scale: f64,
+    /// Velocities that count as one.
+    pub(crate) counted: f64,
 }
 
-impl Tangent {
+impl Linear {
+    /// Its cells at which another one has a velocity, too.
+    pub(crate) fn shared_with(&self, other: &Self) -> Vec<Cell> {
+        let velocity_m_s = &other.here.velocity_m_s;
+        let mut cells = self.cells.clone();
+        cells.retain(|cell| velocity_m_s[[cell.line, cell.gate]].is_finite());
+        cells
+    }
+
     /// The part of the way to other parameters that the slopes can speak for.
     pub(crate) fn reach(&self, to: &[f64]) -> f64 {
         let mut reach = 1.0_f64;
@@ -115,7 +131,7 @@ impl Tangent {
     }
 }
 
-impl Prediction for Tangent {
+impl Prediction for Linear {
     /// To first order everything is possible.
     fn allows(&self, _p: &[f64]) -> bool {
         true

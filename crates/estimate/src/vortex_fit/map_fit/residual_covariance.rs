@@ -29,15 +29,7 @@ use std::sync::Arc;
 
 use crate::linalg::dot;
 use crate::spectrum::transform::complex_transforms;
-use crate::vortex_fit::map_fit::cells::{Cell, orthonormal, products, scaled};
-
-/// Cells with their weighted residuals and, by free number, slopes, over the same deviations.
-#[derive(Clone, Copy)]
-pub(crate) struct Cells<'a> {
-    pub(crate) cells: &'a [Cell],
-    pub(crate) residuals: &'a [f64],
-    pub(crate) slopes: &'a [Vec<f64>],
-}
+use crate::vortex_fit::map_fit::cells::{Cell, Rows, orthonormal, products, scaled};
 
 /// Correlations below this part do not count.
 const LEAST: f64 = 0.05;
@@ -409,19 +401,20 @@ impl<'a> Correlogram<'a> {
     }
 }
 
-/// B, and the number of cells that count as one, from the correlogram of the residuals over at most so many `lines`; `bread` is A^-1.
+/// B, and the number of cells that count as one, from the correlogram of the weighted residuals over at most so many `lines`; `bread` is A^-1.
 pub(crate) fn of_neighbours(
-    all: Cells<'_>,
+    cells: &[Cell],
+    all: &Rows,
     bread: &Array2<f64>,
     lines: usize,
 ) -> (Array2<f64>, f64) {
     let order = all.slopes.len();
-    let plane = Plane::new(all.cells);
-    let Some(correlation) = neighbours(&plane, all.residuals, lines) else {
+    let plane = Plane::new(cells);
+    let Some(correlation) = neighbours(&plane, &all.residuals, lines) else {
         return (Array2::zeros((order, order)), 1.0);
     };
     let alike = correlation.iter().sum::<f64>().max(1.0);
-    let mut scores = plane.quadratic(all.slopes, &correlation);
+    let mut scores = plane.quadratic(&all.slopes, &correlation);
     let mut weights = 0.0;
     let mut weights2 = 0.0;
     let mut squares = 0.0;
@@ -470,9 +463,13 @@ fn neighbours(plane: &Plane<'_>, residuals: &[f64], lines: usize) -> Option<Vec<
 
 /// B, and the number of cells that count as one. Residuals and slopes are summed over blocks of so many lines and gates, over the root of their
 /// number: what is white keeps its variance, and what is correlated within a block is counted as white of more.
-pub(crate) fn decaying(all: Cells<'_>, (lines, gates): (usize, usize)) -> (Array2<f64>, f64) {
+pub(crate) fn decaying(
+    cells: &[Cell],
+    all: &Rows,
+    (lines, gates): (usize, usize),
+) -> (Array2<f64>, f64) {
     let mut places: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
-    for (i, cell) in all.cells.iter().enumerate() {
+    for (i, cell) in cells.iter().enumerate() {
         places
             .entry((cell.line / lines, cell.gate / gates))
             .or_default()
@@ -490,9 +487,9 @@ pub(crate) fn decaying(all: Cells<'_>, (lines, gates): (usize, usize)) -> (Array
     let slopes = all.slopes.iter().map(|slope| block_sums(&places, slope));
     let slopes: Vec<Vec<f64>> = slopes.collect();
     let plane = Plane::new(&blocks);
-    let residuals = block_sums(&places, all.residuals);
+    let residuals = block_sums(&places, &all.residuals);
     let found = Correlogram::new(&plane, &residuals, &slopes).fit();
-    let white = products(&vec![found.white; all.cells.len()], all.slopes);
+    let white = products(&vec![found.white; cells.len()], &all.slopes);
     if found.correlated == 0.0 {
         return (white, 1.0);
     }
@@ -545,16 +542,11 @@ mod tests {
         slopes: &[Vec<f64>],
         lines: usize,
     ) -> Array2<f64> {
-        of_neighbours(
-            Cells {
-                cells,
-                residuals,
-                slopes,
-            },
-            &Array2::eye(slopes.len()),
-            lines,
-        )
-        .0
+        let rows = Rows {
+            residuals: residuals.to_vec(),
+            slopes: slopes.to_vec(),
+        };
+        of_neighbours(cells, &rows, &Array2::eye(slopes.len()), lines).0
     }
 
     /// Where the slopes are, the residuals are three times as large as elsewhere.
@@ -721,12 +713,11 @@ mod tests {
                         .zip(column)
                         .for_each(|(r, c)| *r -= part * c);
                 }
-                let all = Cells {
-                    cells: &cells,
-                    residuals: &residuals,
-                    slopes: &slopes,
+                let all = Rows {
+                    residuals,
+                    slopes: slopes.clone(),
                 };
-                let scores = decaying(all, (1, 1)).0;
+                let scores = decaying(&cells, &all, (1, 1)).0;
                 for (i, slope) in slopes.iter().enumerate() {
                     stated += scores[[i, i]] / dot(slope, slope);
                     found += dot(slope, &noise).powi(2) / dot(slope, slope);
@@ -747,16 +738,11 @@ mod tests {
         ];
         let white = (0..20).filter(|&seed| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-            let residuals: Vec<f64> = cells.iter().map(|_| 2.0 * normal(&mut rng)).collect();
-            decaying(
-                Cells {
-                    cells: &cells,
-                    residuals: &residuals,
-                    slopes: &slopes,
-                },
-                (1, 1),
-            )
-            .1 == 1.0
+            let all = Rows {
+                residuals: cells.iter().map(|_| 2.0 * normal(&mut rng)).collect(),
+                slopes: slopes.clone(),
+            };
+            decaying(&cells, &all, (1, 1)).1 == 1.0
         });
         assert!(white.count() >= 18);
     }

@@ -12,7 +12,8 @@ use crate::linalg::positive_definite::inverse;
 use crate::vortex_fit::map_fit::cells::{products, scaled};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::Scores;
-use crate::vortex_fit::map_fit::setting::{Linear, Setting};
+use crate::vortex_fit::map_fit::prediction::Linear;
+use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::tolerances::SECONDARY;
 use crate::vortex_fit::wake::core_prior::{KNOWN_CORE, secondary_ratios};
 use crate::vortex_fit::wake::pair::SECONDARY_PARAMETERS;
@@ -31,7 +32,7 @@ const LEAST_GAIN: f64 = 20.0;
 const NUMBERS: usize = 2 * SECONDARY_PARAMETERS;
 
 /// Secondary vortices, of the left and of the right vortex, that were found beside a pair.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SecondaryVortices {
     /// The best ones.
     pub vortices: [Vortex; 2],
@@ -39,12 +40,8 @@ pub struct SecondaryVortices {
     pub shown: bool,
     /// Whether they are fitted: they are where the map shows them, unless the options say [`Secondary::Never`] or [`Secondary::Always`].
     pub fitted: bool,
-}
-
-/// Four vortices in place of a pair.
-pub(crate) struct Found {
+    /// The pair of the fit of all four.
     pub(crate) wake: Wake,
-    pub(crate) secondary: SecondaryVortices,
     /// Of the wake alone \[10, 10\], whatever the secondary vortices are.
     pub(crate) covariance: Array2<f64>,
 }
@@ -78,7 +75,7 @@ fn grid(centre: (i64, i64), reach: i64, step: usize) -> impl Iterator<Item = (i6
 impl Setting<'_, '_> {
     /// The best wake with secondary vortices, if the map shows any or they are fitted anyway, and the fit of all comes to an end. Without a ground
     /// there are none.
-    pub(crate) fn with_secondary(&self, pair: &Wake) -> Option<Found> {
+    pub(crate) fn with_secondary(&self, pair: &Wake) -> Option<SecondaryVortices> {
         let vortices = [pair.left, pair.right];
         let are_above_ground = vortices
             .iter()
@@ -113,18 +110,15 @@ impl Setting<'_, '_> {
             .settled(start, &groups, SECONDARY, Some(counted))
             .ok()?;
         // what two vortices miss looks like noise that neighbours share: what four leave tells how many velocities count as one
-        settled.counted = self
-            .about(&settled)
-            .alike(&settled.tangent.at, lines)
-            .min(counted);
+        settled.counted = self.about(&settled).alike(&settled.at, lines).min(counted);
         let gain = self.gain(&settled, &alone) - of_profile / settled.counted;
         self.found(&settled, gain)
     }
 
     /// What is reported of a fit of four vortices that gains so much of the logarithm of the likelihood; nothing if the map does not show the
     /// secondary ones and they are not requested.
-    fn found(&self, settled: &Linear, gain: f64) -> Option<Found> {
-        let p = &settled.tangent.at;
+    fn found(&self, settled: &Linear, gain: f64) -> Option<SecondaryVortices> {
+        let p = &settled.at;
         // one far from its vortex stands for something else; a little beyond the scan it may be
         let are_near = secondary_ratios(p)
             .into_iter()
@@ -141,14 +135,11 @@ impl Setting<'_, '_> {
         };
         let squares = self.about(settled);
         let uncertainty = squares.uncertainty(p, &settled.groups, scores).ok()?;
-        let secondary = SecondaryVortices {
+        Some(SecondaryVortices {
             vortices: model.secondary?,
             shown,
             fitted,
-        };
-        Some(Found {
             wake,
-            secondary,
             covariance: uncertainty.covariance(|_| true).ok()?,
         })
     }
@@ -157,10 +148,10 @@ impl Setting<'_, '_> {
     /// may move along its slopes, how much of the logarithm of the likelihood, and how much these slopes explain.
     fn search(&self, pair: &Wake, alone: &Linear) -> Option<([Vortex; 2], f64, f64)> {
         let groups = self.options.free.groups();
-        let rows = self.about(alone).rows(&alone.tangent.at, &groups);
+        let rows = self.about(alone).rows(&alone.at, &groups);
         let mut slopes = rows.slopes;
         // a profile that does not fit is not mended by vortices
-        let other = self.prediction.of_other_profile(pair) - &alone.tangent.here.velocity_m_s;
+        let other = self.prediction.of_other_profile(pair) - &alone.here.velocity_m_s;
         let of_profile = alone
             .cells
             .iter()

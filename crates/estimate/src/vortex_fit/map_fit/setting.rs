@@ -14,7 +14,7 @@ use crate::vortex_fit::map_fit::cells::{Cell, cells};
 use crate::vortex_fit::map_fit::data::{median, robust_scale};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Scores};
-use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, Tangent, near};
+use crate::vortex_fit::map_fit::prediction::{Linear, Predicted, Prediction, near};
 use crate::vortex_fit::tolerances::{ALMOST_CONVERGED_SIGMAS, MEANS};
 use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{
@@ -35,28 +35,6 @@ pub(crate) struct Setting<'a, 'm> {
     pub(crate) options: &'a MapFitOptions,
     /// Core radii below this do not show \[m\].
     pub(crate) least_core_m: f64,
-}
-
-/// The model made linear about some parameters, with the deviations that the residuals tell there.
-pub(crate) struct Linear {
-    pub(crate) tangent: Tangent,
-    /// Its free numbers.
-    pub(crate) groups: Vec<Vec<usize>>,
-    pub(crate) cells: Vec<Cell>,
-    /// Of the residuals over the stated deviations in uniform wind.
-    scale: f64,
-    /// Velocities that count as one.
-    pub(crate) counted: f64,
-}
-
-impl Linear {
-    /// Its cells at which another one has a velocity, too.
-    pub(crate) fn shared_with(&self, other: &Self) -> Vec<Cell> {
-        let velocity_m_s = &other.tangent.here.velocity_m_s;
-        let mut cells = self.cells.clone();
-        cells.retain(|cell| velocity_m_s[[cell.line, cell.gate]].is_finite());
-        cells
-    }
 }
 
 impl Setting<'_, '_> {
@@ -96,7 +74,7 @@ impl Setting<'_, '_> {
     pub(crate) fn about<'s>(&'s self, linear: &'s Linear) -> LeastSquares<'s> {
         LeastSquares {
             counted: linear.counted,
-            ..self.squares(&linear.tangent, linear.cells.clone())
+            ..self.squares(linear, linear.cells.clone())
         }
     }
 
@@ -112,7 +90,7 @@ impl Setting<'_, '_> {
                 counted,
                 ..self.about(linear)
             };
-            squares.log_likelihood(&linear.tangent.at, &linear.groups)
+            squares.log_likelihood(&linear.at, &linear.groups)
         });
         (of_better - of_other) / counted
     }
@@ -159,7 +137,7 @@ impl Setting<'_, '_> {
         let linear = self.settled(start, &groups, stop, None)?;
         self.outcome(
             &self.about(&linear),
-            &linear.tangent.at,
+            &linear.at,
             &linear.groups,
             linear.scale,
         )
@@ -207,7 +185,7 @@ impl Setting<'_, '_> {
                 }
                 return Ok(linear);
             }
-            let longest = share.min(linear.tangent.reach(&next));
+            let longest = share.min(linear.reach(&next));
             p = self
                 .moved(&p, &way, longest)
                 .ok_or(not_converged(steps, sigmas_left))?;
@@ -234,12 +212,10 @@ impl Setting<'_, '_> {
         last: Option<Linear>,
         counted: Option<f64>,
     ) -> Result<Linear, Error> {
-        let kept = last.filter(|last| {
-            let tangent = &last.tangent;
-            near(&tangent.slopes_at, p) && tangent.here.slopes.len() == groups.len()
-        });
+        let kept =
+            last.filter(|last| near(&last.slopes_at, p) && last.here.slopes.len() == groups.len());
         let counted = counted.or(kept.as_ref().map(|kept| kept.counted));
-        let mut linear = self.linear(p, groups, kept.map(|kept| kept.tangent))?;
+        let mut linear = self.linear(p, groups, kept)?;
         linear.counted = match counted {
             Some(counted) => counted,
             None => self.about(&linear).alike(p, self.options.correlated_lines),
@@ -264,7 +240,7 @@ impl Setting<'_, '_> {
         &self,
         p: &[f64],
         groups: &[Vec<usize>],
-        known: Option<Tangent>,
+        known: Option<Linear>,
     ) -> Result<Linear, Error> {
         let mut here = self
             .prediction
@@ -291,13 +267,10 @@ impl Setting<'_, '_> {
         finite("scale of the residuals", scale)?;
         let scale = scale.max(1e-6);
         cells.iter_mut().for_each(|cell| cell.sigma_m_s *= scale);
-        let tangent = Tangent {
+        Ok(Linear {
             at: p.to_vec(),
             here,
             slopes_at,
-        };
-        Ok(Linear {
-            tangent,
             groups: groups.to_vec(),
             cells,
             scale,

@@ -10,7 +10,7 @@ use std::rc::Rc;
 use crate::error::Error;
 use crate::linalg::positive_definite::inverse;
 use crate::vortex_fit::signal_fit::ascent::{Ascent, State};
-use crate::vortex_fit::signal_fit::tops::{CORES_OVER_SPACING, Candidate, near_lines};
+use crate::vortex_fit::signal_fit::tops::{CORES_OVER_SPACING, near_lines};
 use crate::vortex_fit::top::mixed;
 use crate::vortex_fit::wake::free_parameters::spread;
 use crate::vortex_fit::{
@@ -112,16 +112,14 @@ pub fn fit_signals<S: Sample>(
     };
     let mut tops = vec![search.settle((start, Powers::default()), true)?];
     if options.starts == Starts::Several {
-        for other in search.others(&tops[0])? {
-            let settled = if other.close {
-                search.settle(other.state, false)
-            } else {
-                let log_likelihood = tops[0].log_likelihood + other.gain;
-                Ok(Settled {
+        for (state, gain) in search.others(&tops[0])? {
+            let settled = match gain {
+                None => search.settle(state, false),
+                Some(gain) => Ok(Settled {
                     model: Rc::clone(&tops[0].model),
-                    state: other.state,
-                    log_likelihood,
-                })
+                    state,
+                    log_likelihood: tops[0].log_likelihood + gain,
+                }),
             };
             // a start that does not converge is no maximum
             tops.extend(settled);
@@ -206,7 +204,7 @@ impl Search<'_> {
     }
 
     /// States near other maxima than the first.
-    fn others(&self, first: &Settled) -> Result<Vec<Candidate>, Error> {
+    fn others(&self, first: &Settled) -> Result<Vec<(State, Option<f64>)>, Error> {
         let mut guess = first.state.0;
         if self.options.free.core_radius != Sharing::Fixed {
             guess = guess.with_cores(CORES_OVER_SPACING[1] * guess.spacing_m());

@@ -3,7 +3,7 @@
 use super::*;
 use crate::bound::Noise;
 use crate::linalg;
-use crate::vortex_fit::{CoreProfile, PulseShape, ScanSetup, Vortex, WakeModel, WindFit};
+use crate::vortex_fit::{CoreProfile, ScanSetup, Vortex, WakeModel, WindFit};
 use crate::window::{SPEED_OF_LIGHT_M_S, Sampling, SignalKind};
 use rand::{RngExt, SeedableRng};
 use std::f64::consts::{PI, SQRT_2};
@@ -33,7 +33,7 @@ fn setup(profile: CoreProfile) -> ScanSetup {
         sampling: Sampling::baseband(50e6, 1.55e-6, 50e6).unwrap(),
         kind: SignalKind::Complex,
         noise: Noise::White,
-        pulse: PulseShape::gaussian(SIGMA_S).unwrap(),
+        pulse_sigma_s: SIGMA_S,
         wake: WakeModel {
             profile,
             ..Default::default()

@@ -12,7 +12,7 @@ use crate::error::{Error, finite, not_empty, not_negative, positive};
 use crate::vortex_fit::signal_fit::baseband::PowerGain;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::pulse::PairWeights;
-use crate::vortex_fit::{Baseband, CoreProfile, PulseShape, Vortex, Wake, WakeModel};
+use crate::vortex_fit::{Baseband, CoreProfile, Vortex, Wake, WakeModel};
 use crate::window::{SPEED_OF_LIGHT_M_S, Sampling, SignalKind};
 
 /// Covariances below this fraction of the noise are neglected.
@@ -31,8 +31,8 @@ pub struct ScanSetup {
     pub kind: SignalKind,
     /// Spectrum of their noise.
     pub noise: Noise,
-    /// The pulse.
-    pub pulse: PulseShape,
+    /// Half-width of the power of the Gaussian pulse at 1/e \[s\].
+    pub pulse_sigma_s: f64,
     /// What is known of the wake.
     pub wake: WakeModel,
     /// Elevation of each ray (pulse) \[rad\], in any order.
@@ -102,6 +102,7 @@ impl ScanModel {
         thicker: f64,
     ) -> Result<Self, Error> {
         guess.validate()?;
+        positive("pulse_sigma_s", setup.pulse_sigma_s)?;
         finite("first_sample_time_s", setup.first_sample_time_s)?;
         for &elevation_rad in &setup.elevation_rad {
             finite("elevation_rad", elevation_rad)?;
@@ -112,7 +113,7 @@ impl ScanModel {
         let interval_s = baseband.interval_s();
         let first_time_s = setup.first_sample_time_s + baseband.delay_s();
         // the first table serves to place the layers, the second has the lags that their SNR needs
-        let probe = PairWeights::new(&setup.pulse, interval_s, samples, 1.0);
+        let probe = PairWeights::new(setup.pulse_sigma_s, interval_s, samples, 1.0);
         let cutter = Cutter {
             setup,
             guess,
@@ -125,7 +126,7 @@ impl ScanModel {
         let (lines, largest_snr) = cutter.lines(&snr)?;
         positive("largest SNR", largest_snr)?;
         let cut = CUT / largest_snr.max(1.0);
-        let weights = PairWeights::new(&setup.pulse, interval_s, samples, cut);
+        let weights = PairWeights::new(setup.pulse_sigma_s, interval_s, samples, cut);
         Ok(Self {
             wake: setup.wake,
             gain: baseband.power_gain(),
@@ -227,7 +228,7 @@ impl Cutter<'_> {
             gradient_per_s += vortex.circulation_m2_s.abs() / (2.0 * PI * radius_m * radius_m);
         }
         let limit_m =
-            self.setup.sampling.wavelength_m / (16.0 * self.setup.pulse.sigma_s * gradient_per_s);
+            self.setup.sampling.wavelength_m / (16.0 * self.setup.pulse_sigma_s * gradient_per_s);
         (self.spacing_m / (self.thicker * limit_m))
             .ceil()
             .clamp(1.0, MOST_LAYERS)

@@ -33,23 +33,19 @@ const MOST: usize = 6;
 /// Maxima of the near lines within this of the best are refined with all lines; the others keep the result of the near lines.
 const CLOSE_BELOW: f64 = 2.0;
 
-/// Another maximum, found with the near lines.
-pub(crate) struct Candidate {
-    pub(crate) state: State,
-    /// ln p over that of the first maximum.
-    pub(crate) gain: f64,
-    /// Whether it may be the highest with all lines.
-    pub(crate) close: bool,
-}
-
 impl Ascent<'_> {
-    /// States near other maxima than `top`, the best first, found with the lines near the vortices.
+    /// States near other maxima than `top`, the best first, found with the lines near the vortices, each with its gain of ln p over `top`; without a
+    /// gain where it may be the highest with all lines.
     ///
     /// `near` is a model of the near lines ([`near_lines`]).
     ///
     /// # Errors
     /// As [`ScanModel::information`].
-    pub(crate) fn other_tops(&self, near: &ScanModel, top: State) -> Result<Vec<Candidate>, Error> {
+    pub(crate) fn other_tops(
+        &self,
+        near: &ScanModel,
+        top: State,
+    ) -> Result<Vec<(State, Option<f64>)>, Error> {
         let options = self.options;
         let rough = SignalFitOptions {
             tolerance_sigmas: 0.1,
@@ -99,11 +95,8 @@ impl Ascent<'_> {
         found.truncate(MOST);
         let mut candidates = Vec::with_capacity(found.len());
         for (state, value) in found {
-            candidates.push(Candidate {
-                state,
-                gain: value - value_at_top,
-                close: value > best - CLOSE_BELOW,
-            });
+            let may_be_highest = value > best - CLOSE_BELOW;
+            candidates.push((state, (!may_be_highest).then_some(value - value_at_top)));
         }
         Ok(candidates)
     }

@@ -181,10 +181,10 @@ mod tests {
                 for line in [tile.lines.start, tile.lines.end - 1] {
                     for gate in [tile.gates.start, tile.gates.end - 1] {
                         let point = PolarPoint::at_elevation(range_m[gate], elevation_rad[line]);
-                        for chord in places.chords(point, 5.0) {
-                            assert!(read.contains(&chord.line), "{point:?} {chord:?} {tile:?}");
+                        for (line, gates) in places.chords(point, 5.0) {
+                            assert!(read.contains(&line), "{point:?} {gates:?} {tile:?}");
                             assert!(
-                                windows.start <= chord.first && chord.last < windows.end,
+                                windows.start <= gates.start && gates.end <= windows.end,
                                 "{point:?} {tile:?}"
                             );
                         }
