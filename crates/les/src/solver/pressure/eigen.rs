@@ -19,15 +19,6 @@ use super::super::mesh::{Ends, Wall};
 use super::super::operators_1d::Operators1d;
 use super::kernel;
 
-/// Eigenvalues and eigenvectors of one direction.
-#[derive(Debug)]
-pub(crate) struct Basis {
-    /// Eigenvalues \[1/m^2\], ascending; the first is 0.
-    pub(crate) value: Vec<f64>,
-    /// Eigenvectors \[m^-1/2\], `[cell][mode]`.
-    pub(crate) vector: Vec<f64>,
-}
-
 /// Sweeps after which the rotations have converged on every mesh (about 10 are needed).
 const MAX_SWEEPS: usize = 40;
 /// Cosine of the angle of two columns that is round-off.
@@ -37,119 +28,110 @@ const LAST_SWEEP: f64 = 1e-10;
 /// Norm of a column, relative to the largest, below which it is the null vector's.
 const NULL: f64 = 1e-13;
 
-impl Basis {
-    /// The eigenvectors of `line`.
-    pub(crate) fn new(line: &Operators1d) -> Self {
-        let slip = matches!(
-            line.ends,
-            Ends::Walls {
-                low: Wall::Slip,
-                high: Wall::Slip
-            }
-        );
-        let uniform = line
-            .cell_metric_m
+/// Eigenvalues \[1/m^2\], ascending, and eigenvectors \[m^-1/2\], `[cell][mode]`.
+pub(crate) type Basis = (Vec<f64>, Vec<f64>);
+
+/// The basis of `line`; its first eigenvalue is 0.
+pub(crate) fn basis(line: &Operators1d) -> Basis {
+    let slip = matches!(
+        line.ends,
+        Ends::Walls {
+            low: Wall::Slip,
+            high: Wall::Slip
+        }
+    );
+    let uniform = line
+        .cell_metric_m
+        .iter()
+        .all(|h| *h == line.cell_metric_m[0]);
+    if line.is_thin() {
+        (vec![0.0], vec![1.0 / line.cell_mass_m[0].sqrt()])
+    } else if line.is_fourier() {
+        waves(line)
+    } else if slip && uniform {
+        cosines(line)
+    } else {
+        rotations(line)
+    }
+}
+
+fn waves(line: &Operators1d) -> Basis {
+    let n = line.cells;
+    let h = line.cell_mass_m[0];
+    let length = n as f64 * h;
+    let mut vector = Vec::with_capacity(n * n);
+    for i in 0..n {
+        for m in 0..n {
+            let wave = m.div_ceil(2);
+            let angle = 2.0 * PI * ((i * wave) % n) as f64 / n as f64;
+            let is_single = m == 0 || 2 * wave == n;
+            let norm = if is_single {
+                1.0 / length.sqrt()
+            } else {
+                (2.0 / length).sqrt()
+            };
+            let is_cosine = m % 2 == 1 || m == 0;
+            vector.push(norm * if is_cosine { angle.cos() } else { -angle.sin() });
+        }
+    }
+    (wave_values(n, h), vector)
+}
+
+/// Eigenvalues \[1/m^2\] of `n` periodic cells of width `h` \[m\]: the constant, then the
+/// waves, in pairs.
+pub(crate) fn wave_values(n: usize, h: f64) -> Vec<f64> {
+    (0..n)
+        .map(|m| symbol(2.0 * PI * m.div_ceil(2) as f64 / n as f64, h))
+        .collect()
+}
+
+fn cosines(line: &Operators1d) -> Basis {
+    let n = line.cells;
+    let h = line.cell_mass_m[0];
+    let length = n as f64 * h;
+    let mut vector = Vec::with_capacity(n * n);
+    for i in 0..n {
+        vector.push(1.0 / length.sqrt());
+        for m in 1..n {
+            let angle = PI * (((2 * i + 1) * m) % (4 * n)) as f64 / (2 * n) as f64;
+            vector.push((2.0 / length).sqrt() * angle.cos());
+        }
+    }
+    let value = (0..n).map(|m| symbol(PI * m as f64 / n as f64, h));
+    (value.collect(), vector)
+}
+
+fn rotations(line: &Operators1d) -> Basis {
+    let n = line.cells;
+    let mass = &line.cell_mass_m;
+    let mut columns = scaled_columns(line);
+    orthogonalise(&mut columns);
+    let mut modes: Vec<(f64, Vec<f64>)> = columns
+        .into_iter()
+        .map(|column| (kernel::dot(&column, &column), column))
+        .collect();
+    modes.sort_by(|a, b| b.0.total_cmp(&a.0));
+    modes.truncate(n - 1);
+    modes.reverse();
+    let length: f64 = mass.iter().sum();
+    let mut value = vec![0.0];
+    let mut vector = vec![1.0 / length.sqrt(); n * n];
+    for (m, (lambda, column)) in modes.into_iter().enumerate() {
+        value.push(lambda);
+        let mut v: Vec<f64> = column
             .iter()
-            .all(|h| *h == line.cell_metric_m[0]);
-        if line.is_thin() {
-            Self {
-                value: vec![0.0],
-                vector: vec![1.0 / line.cell_mass_m[0].sqrt()],
-            }
-        } else if line.is_fourier() {
-            Self::waves(line)
-        } else if slip && uniform {
-            Self::cosines(line)
-        } else {
-            Self::rotations(line)
-        }
-    }
-
-    fn waves(line: &Operators1d) -> Self {
-        let n = line.cells;
-        let h = line.cell_mass_m[0];
-        let length = n as f64 * h;
-        let mut vector = Vec::with_capacity(n * n);
-        for i in 0..n {
-            for m in 0..n {
-                let wave = m.div_ceil(2);
-                let angle = 2.0 * PI * ((i * wave) % n) as f64 / n as f64;
-                let is_single = m == 0 || 2 * wave == n;
-                let norm = if is_single {
-                    1.0 / length.sqrt()
-                } else {
-                    (2.0 / length).sqrt()
-                };
-                let is_cosine = m % 2 == 1 || m == 0;
-                vector.push(norm * if is_cosine { angle.cos() } else { -angle.sin() });
-            }
-        }
-        Self {
-            value: Self::wave_values(n, h),
-            vector,
-        }
-    }
-
-    /// Eigenvalues \[1/m^2\] of `n` periodic cells of width `h` \[m\]: the constant, then the
-    /// waves, in pairs.
-    pub(crate) fn wave_values(n: usize, h: f64) -> Vec<f64> {
-        (0..n)
-            .map(|m| symbol(2.0 * PI * m.div_ceil(2) as f64 / n as f64, h))
-            .collect()
-    }
-
-    fn cosines(line: &Operators1d) -> Self {
-        let n = line.cells;
-        let h = line.cell_mass_m[0];
-        let length = n as f64 * h;
-        let mut vector = Vec::with_capacity(n * n);
-        for i in 0..n {
-            vector.push(1.0 / length.sqrt());
-            for m in 1..n {
-                let angle = PI * (((2 * i + 1) * m) % (4 * n)) as f64 / (2 * n) as f64;
-                vector.push((2.0 / length).sqrt() * angle.cos());
-            }
-        }
-        Self {
-            value: (0..n)
-                .map(|m| symbol(PI * m as f64 / n as f64, h))
-                .collect(),
-            vector,
-        }
-    }
-
-    fn rotations(line: &Operators1d) -> Self {
-        let n = line.cells;
-        let mass = &line.cell_mass_m;
-        let mut columns = scaled_columns(line);
-        orthogonalise(&mut columns);
-        let mut modes: Vec<(f64, Vec<f64>)> = columns
-            .into_iter()
-            .map(|column| (kernel::dot(&column, &column), column))
+            .zip(mass)
+            .map(|(w, mass)| w / (lambda * mass).sqrt())
             .collect();
-        modes.sort_by(|a, b| b.0.total_cmp(&a.0));
-        modes.truncate(n - 1);
-        modes.reverse();
-        let length: f64 = mass.iter().sum();
-        let mut value = vec![0.0];
-        let mut vector = vec![1.0 / length.sqrt(); n * n];
-        for (m, (lambda, column)) in modes.into_iter().enumerate() {
-            value.push(lambda);
-            let mut v: Vec<f64> = column
-                .iter()
-                .zip(mass)
-                .map(|(w, mass)| w / (lambda * mass).sqrt())
-                .collect();
-            // Round-off along the constant would couple to the free level of the pressure.
-            let weighted = v.iter().zip(mass).map(|(v, mass)| v * mass);
-            let mean = weighted.sum::<f64>() / length;
-            v.iter_mut().for_each(|v| *v -= mean);
-            for (cell, v) in v.into_iter().enumerate() {
-                vector[cell * n + m + 1] = v;
-            }
+        // Round-off along the constant would couple to the free level of the pressure.
+        let weighted = v.iter().zip(mass).map(|(v, mass)| v * mass);
+        let mean = weighted.sum::<f64>() / length;
+        v.iter_mut().for_each(|v| *v -= mean);
+        for (cell, v) in v.into_iter().enumerate() {
+            vector[cell * n + m + 1] = v;
         }
-        Self { value, vector }
     }
+    (value, vector)
 }
 
 /// Eigenvalue \[1/m^2\] of the wave of phase `theta` per cell of width `h` \[m\].
@@ -242,7 +224,7 @@ mod tests {
         for direction in every_kind() {
             let line = Operators1d::new(&direction);
             let n = line.cells;
-            let Basis { value, vector } = Basis::new(&line);
+            let (value, vector) = basis(&line);
             let dense = stiffness(&line);
             let largest = value.iter().fold(0.0, |a: f64, b| a.max(*b));
             assert_eq!(value[0], 0.0);
@@ -281,9 +263,9 @@ mod tests {
             Direction::between(21, 0.0, 2.0, Wall::Slip, Wall::Slip),
         ] {
             let line = Operators1d::new(&direction);
-            let closed = Basis::new(&line);
-            let rotated = Basis::rotations(&line);
-            for (a, b) in closed.value.iter().zip(&rotated.value) {
+            let closed = basis(&line);
+            let rotated = rotations(&line);
+            for (a, b) in closed.0.iter().zip(&rotated.0) {
                 assert!((a - b).abs() <= 1e-13 * a, "{direction:?}: {a} against {b}");
             }
         }

@@ -13,7 +13,7 @@ use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use super::super::operators_1d::Operators1d;
-use super::eigen::Basis;
+use super::eigen::{basis, wave_values};
 use super::fold::Fold;
 use super::gemm::{PackedMatrix, Panels};
 
@@ -91,9 +91,9 @@ impl RowTransform {
                 inverse: planner.plan_fft_inverse(n),
             };
             let h = line.cell_mass_m[0];
-            (transform, Basis::wave_values(n, h), 1.0 / (n as f64 * h))
+            (transform, wave_values(n, h), 1.0 / (n as f64 * h))
         } else {
-            let Basis { value, vector } = Basis::new(line);
+            let (value, vector) = basis(line);
             let vectors = Fold::none(n, &vector);
             (
                 Self::Dense(Box::new([
@@ -202,7 +202,7 @@ pub(crate) enum LineTransform {
 impl LineTransform {
     /// The transform and the eigenvalues of its modes.
     pub(crate) fn new(line: &Operators1d) -> (Self, Vec<f64>) {
-        let Basis { value, vector } = Basis::new(line);
+        let (value, vector) = basis(line);
         if line.is_thin() {
             return (Self::Thin(vector[0]), value);
         }
@@ -262,8 +262,8 @@ mod tests {
             let line = Operators1d::new(&Direction::periodic(n, 0.0, 3.0));
             let (transform, value, factor) = RowTransform::new(&line);
             assert_eq!(format!("{transform:?}"), "Fourier");
-            let basis = Basis::new(&line);
-            assert_eq!(value, basis.value);
+            let (values, vectors) = basis(&line);
+            assert_eq!(value, values);
             let row: Vec<f64> = (0..n).map(|i| (1.0 + i as f64).sqrt().sin()).collect();
             let mut modes = row.clone();
             transform.apply(
@@ -272,7 +272,7 @@ mod tests {
                 &mut Work::default(),
             );
             for (m, mode) in modes.iter().enumerate() {
-                let product: f64 = (0..n).map(|i| basis.vector[i * n + m] * row[i]).sum();
+                let product: f64 = (0..n).map(|i| vectors[i * n + m] * row[i]).sum();
                 // The Fourier transform has no norm; waves in pairs have twice the norm of single
                 // ones.
                 let single = m == 0 || m == n - 1 && n % 2 == 0;
@@ -314,7 +314,7 @@ mod tests {
             let line = Operators1d::new(&direction);
             let n = line.cells;
             let width = 37;
-            let Basis { value, vector } = Basis::new(&line);
+            let (value, vector) = basis(&line);
             let fold = Fold::new(n, &vector);
             assert_eq!(fold.blocks.len(), blocks, "{direction:?}");
             let (transform, values) = LineTransform::new(&line);
