@@ -10,6 +10,7 @@
 
 use num_complex::Complex;
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 type C = Complex<f64>;
 
@@ -18,6 +19,11 @@ type C = Complex<f64>;
 const LEAST_RAD: f64 = 60.0;
 /// Nodes of a rule.
 const NODES: usize = 16;
+
+/// Rules for integrals from 0 to infinity with the weights exp(-t) and sqrt(t) exp(-t), for ends
+/// away from and at the end of an arc.
+static REGULAR: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(NODES, 0.0));
+static BRANCH: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(NODES, 0.5));
 
 /// An arc of radius `radius_m` about `centre_m` on the axis, over part of the axis, and the 1/e
 /// radius of the light.
@@ -28,58 +34,40 @@ pub(crate) struct Arc {
     pub(crate) intensity_radius_m: f64,
 }
 
-/// Rules for integrals from 0 to infinity with the weights exp(-t) and sqrt(t) exp(-t).
-#[derive(Debug, Clone)]
-pub(crate) struct Descent {
-    regular: Vec<(f64, f64)>,
-    branch: Vec<(f64, f64)>,
-}
-
-impl Descent {
-    pub(crate) fn new() -> Self {
-        Self {
-            regular: laguerre(NODES, 0.0),
-            branch: laguerre(NODES, 0.5),
-        }
-    }
-
+impl Arc {
     /// Integral of f(x) cos(kappa x) from `low` to `high` under the arc; none where kappa is too
     /// small for the rules.
-    pub(crate) fn integral(&self, arc: Arc, low: f64, high: f64, kappa: f64) -> Option<f64> {
+    pub(crate) fn integral(self, low: f64, high: f64, kappa: f64) -> Option<f64> {
         let kappa = kappa.abs();
-        if kappa * (high - low).min(arc.intensity_radius_m) < LEAST_RAD {
+        if kappa * (high - low).min(self.intensity_radius_m) < LEAST_RAD {
             return None;
         }
-        let at_low = self.descent_from(arc, low, kappa)?;
-        let at_high = self.descent_from(arc, high, kappa)?;
+        let at_low = self.descent_from(low, kappa)?;
+        let at_high = self.descent_from(high, kappa)?;
         Some((at_low - at_high).re)
     }
 
     /// Integral of f(x) exp(j kappa x) from `at` to `at` + j infinity.
-    fn descent_from(&self, arc: Arc, at: f64, kappa: f64) -> Option<C> {
-        let offset = at - arc.centre_m;
-        let to_branch = arc.radius_m - offset.abs();
-        let is_branch = to_branch <= 1e-13 * arc.radius_m;
+    fn descent_from(self, at: f64, kappa: f64) -> Option<C> {
+        let offset = at - self.centre_m;
+        let to_branch = self.radius_m - offset.abs();
+        let is_branch = to_branch <= 1e-13 * self.radius_m;
         if !is_branch && kappa * to_branch < LEAST_RAD {
             return None;
         }
-        let rule = if is_branch {
-            &self.branch
-        } else {
-            &self.regular
-        };
+        let rule = if is_branch { &BRANCH } else { &REGULAR };
         // h^2 = p^2 - (offset + j t)^2; at a branch p^2 - offset^2 is 0 and h is sqrt(t) times a
         // smooth function.
         let on_axis = if is_branch {
             0.0
         } else {
-            (arc.radius_m - offset) * (arc.radius_m + offset)
+            (self.radius_m - offset) * (self.radius_m + offset)
         };
         let mut sum = C::new(0.0, 0.0);
-        for &(node, weight) in rule {
+        for &(node, weight) in rule.iter() {
             let t = node / kappa;
             let half = C::new(on_axis + t * t, -2.0 * offset * t).sqrt();
-            let value = arc.chord(C::new(at, t), half);
+            let value = self.chord(C::new(at, t), half);
             let weight = if is_branch {
                 weight / node.sqrt()
             } else {
@@ -89,9 +77,7 @@ impl Descent {
         }
         Some(C::new(0.0, 1.0 / kappa) * C::cis(kappa * at) * sum)
     }
-}
 
-impl Arc {
     /// exp(-x^2/s^2) times the integral of exp(-y^2/s^2) from -half to half.
     fn chord(self, x: C, half: C) -> C {
         let s = self.intensity_radius_m;
@@ -219,7 +205,6 @@ mod tests {
     #[test]
     fn descent_agrees_with_panels_where_both_hold() {
         let rule = GaussLegendre::new(20);
-        let descent = Descent::new();
         for s in [0.012, 0.03, f64::INFINITY] {
             let arc = Arc {
                 centre_m: -0.007,
@@ -238,7 +223,7 @@ mod tests {
                             * arc.chord(C::new(x, 0.0), C::new(y, 0.0)).re
                             * (kappa * x).cos()
                     });
-                    let found = descent.integral(arc, low, high, kappa).unwrap();
+                    let found = arc.integral(low, high, kappa).unwrap();
                     // Against the size of the integrand: what an efficiency needs.
                     assert!(
                         (found - panels).abs() < 1e-13 * (high - low),
@@ -246,7 +231,7 @@ mod tests {
                     );
                 }
             }
-            assert!(descent.integral(arc, 0.004, 0.043, 1e3).is_none());
+            assert!(arc.integral(0.004, 0.043, 1e3).is_none());
         }
     }
 }

@@ -13,7 +13,7 @@
 
 use crate::beam::Telescope;
 use crate::quadrature::{GaussLegendre, adaptive};
-use crate::theory::descent::{Arc, Descent};
+use crate::theory::descent::Arc;
 use crate::{Error, Misalignment};
 use std::f64::consts::PI;
 
@@ -68,7 +68,6 @@ pub(crate) fn check_fresnel_number(telescope: &Telescope, range_m: f64) -> Resul
 pub(crate) struct Overlap {
     telescope: Telescope,
     rule: GaussLegendre,
-    descent: Descent,
     /// k (1/R - 1/F) \[rad/m^2\].
     phase_rad_m2: f64,
 }
@@ -79,7 +78,6 @@ impl Overlap {
         Self {
             telescope: *telescope,
             rule: GaussLegendre::new(20),
-            descent: Descent::new(),
             phase_rad_m2: telescope.wavenumber_rad_m() * curvature_per_m,
         }
     }
@@ -139,7 +137,7 @@ impl Overlap {
             radius_m: radius,
             intensity_radius_m: s,
         };
-        if let Some(integral) = self.descent.integral(arc, low, high, kappa) {
+        if let Some(integral) = arc.integral(low, high, kappa) {
             return integral;
         }
         // 20 nodes carry up to 16 rad (in the middle of the arc), and about two 1/e radii
