@@ -73,7 +73,7 @@ impl<'a> Estimates<'a, '_> {
         keep_small_cores(&mut p, &mut groups, setting.least_core_m);
         let linear = setting.linear(&p, &groups, None)?;
         let squares = setting.about(&linear);
-        let noise = Noise::new(&shown.prepared, &squares.cells);
+        let noise = noise_correlation(&shown.prepared, &squares.cells);
         let remainder = self.remainder(&shown, &squares, (&p, &groups), &noise);
         let table = gate_covariance(&remainder.gates, shown.prepared.kernel.width_m())?;
         let Some(turbulence) = remainder.turbulence(&table)? else {
@@ -91,7 +91,7 @@ impl<'a> Estimates<'a, '_> {
         };
         if !turbulence.stands_out() {
             let of_noise = |i: usize, k: usize| {
-                turbulence.noise_factor * noise.correlation([&squares.cells[i], &squares.cells[k]])
+                turbulence.noise_factor * noise([&squares.cells[i], &squares.cells[k]])
             };
             let uncertainty = squares.uncertainty(&p, &groups, Scores::Correlated(&of_noise))?;
             turbulent.of_air = in_all - uncertainty.covariance(|_| true)?;
@@ -121,7 +121,7 @@ impl<'a> Estimates<'a, '_> {
         shown: &EstimatorPrediction<'_, '_>,
         squares: &LeastSquares<'_>,
         (p, groups): (&[f64], &[Vec<usize>]),
-        noise: &Noise<'_>,
+        noise: &(impl Fn([&Cell; 2]) -> f64 + Sync),
     ) -> Remainder {
         let mut few = LeastSquares {
             cells: self.apart(&squares.cells, shown),
@@ -136,7 +136,7 @@ impl<'a> Estimates<'a, '_> {
         let noise_std_m_s = cells.iter().map(|cell| cell.sigma_m_s).collect();
         let gates = gate_positions(self.scan, &cells, self.model, &Wake::from_list(p));
         let correlation = Array2::from_shape_fn((cells.len(), cells.len()), |(i, j)| {
-            noise.correlation([&cells[i], &cells[j]])
+            noise([&cells[i], &cells[j]])
         });
         Remainder::new(gates, rows, noise_std_m_s).with_correlated_noise(correlation)
     }
@@ -160,13 +160,13 @@ impl<'a> Estimates<'a, '_> {
         &self,
         wake: &Wake,
         (turbulence, table): (&'c ScanTurbulence, &'c GateCovariance),
-        noise: &'c Noise<'_>,
+        noise: &'c (impl Fn([&Cell; 2]) -> f64 + Sync),
         [cells, in_scan]: [&'c [Cell]; 2],
     ) -> impl Fn(usize, usize) -> f64 + Sync + 'c {
         let gates = gate_positions(self.scan, in_scan, self.model, wake);
         move |i, j| {
             let air_m2_s2 = turbulence.covariance_of_air_m2_s2(table, [&gates[i], &gates[j]]);
-            let of_noise = turbulence.noise_factor * noise.correlation([&cells[i], &cells[j]]);
+            let of_noise = turbulence.noise_factor * noise([&cells[i], &cells[j]]);
             air_m2_s2 / (cells[i].sigma_m_s * cells[j].sigma_m_s) + of_noise
         }
     }
@@ -185,7 +185,7 @@ impl<'a> Estimates<'a, '_> {
         let shown = self.shown_at(&map).ok()?;
         let setting = shown.setting();
         let best = setting.settled_nearby(pair, side, ESTIMATES)?;
-        let noise = Noise::new(&shown.prepared, &best.cells);
+        let noise = noise_correlation(&shown.prepared, &best.cells);
         let in_scan = near.in_whole_map(&best.cells);
         let covariance = self.covariance(pair, air, &noise, [&best.cells, &in_scan]);
         let nearby = setting.local_variance(&best, side, Scores::Correlated(&covariance))?;
@@ -217,39 +217,29 @@ impl TurbulentFit {
     }
 }
 
-/// How the noise of places is correlated.
-struct Noise<'a> {
+/// Correlation of the noise of two cells of a map, of whose least standard deviation `cells` tell. Gates share the noise that they have in uniform
+/// wind, which is the least; what the air about vortices adds to it only lines share.
+fn noise_correlation<'a>(
     prepared: &'a Prepared<'a>,
-    /// Least standard deviation of a cell \[m/s\].
-    least_m_s: f64,
-}
-
-impl<'a> Noise<'a> {
-    fn new(prepared: &'a Prepared<'a>, cells: &[Cell]) -> Self {
-        let sigmas_m_s = cells.iter().map(|cell| cell.sigma_m_s);
-        Self {
-            prepared,
-            least_m_s: sigmas_m_s.fold(f64::INFINITY, f64::min),
-        }
-    }
-
-    /// Correlation of the noise of two cells. Gates share the noise that they have in uniform wind, which is the least; what the air about vortices
-    /// adds to it only lines share.
-    fn correlation(&self, [a, b]: [&Cell; 2]) -> f64 {
+    cells: &[Cell],
+) -> impl Fn([&Cell; 2]) -> f64 + Sync + use<'a> {
+    let sigmas_m_s = cells.iter().map(|cell| cell.sigma_m_s);
+    let least_m_s = sigmas_m_s.fold(f64::INFINITY, f64::min);
+    move |[a, b]| {
         if (a.line, a.gate) == (b.line, b.gate) {
             return 1.0;
         }
-        let of_gates = self.prepared.noise_correlation_of_gates([a.gate, b.gate]);
+        let of_gates = prepared.noise_correlation_of_gates([a.gate, b.gate]);
         if of_gates < LEAST {
             return 0.0;
         }
-        let least = [a, b].map(|cell| self.least_m_s / cell.sigma_m_s);
+        let least = [a, b].map(|cell| least_m_s / cell.sigma_m_s);
         let of_air = match a.gate == b.gate {
             true => least.map(|part| (1.0 - part * part).sqrt()),
             false => [0.0; 2],
         };
         let places = [[a.line, a.gate], [b.line, b.gate]];
-        let of_lines = self.prepared.noise_correlation_of_lines(places);
+        let of_lines = prepared.noise_correlation_of_lines(places);
         let shared = least[0] * least[1] * of_gates + of_air[0] * of_air[1];
         (1.0 - OWN_NOISE) * of_lines * shared
     }

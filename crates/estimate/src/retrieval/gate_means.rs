@@ -12,7 +12,7 @@ use crate::retrieval::report::{OUTLIER, Report};
 use crate::retrieval::scan_turbulence::{Remainder, gate_covariance, gate_positions};
 use crate::retrieval::whitening::Whitening;
 use crate::retrieval::{
-    Covariance, Flag, Movement, RetrievalOptions, ScanMap, ScanResult, ScanTurbulence, Turbulence,
+    Flag, Movement, RetrievalOptions, ScanMap, ScanResult, ScanTurbulence, Turbulence,
 };
 use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::map_fit::gates::Gates;
@@ -134,7 +134,6 @@ fn in_turbulence_of_scan(
     let whitening = whitening.ok_or(singular(remainder.gates.len()))?;
     let options = RetrievalOptions {
         loss: Loss::Squares,
-        covariance: Covariance::Model,
         ..all.options.clone()
     };
     let mut stage = Stage {
@@ -142,6 +141,7 @@ fn in_turbulence_of_scan(
         ..all.clone()
     };
     stage.squares.loss = options.loss;
+    stage.is_noise_known = true;
     stage.squares.whitening = Some(&whitening);
     let ends = stage.again(ends);
     let cells = stage.squares.cells.len();

@@ -127,6 +127,8 @@ pub(crate) struct Stage<'a> {
     pub(crate) thinned: bool,
     /// Whether the residuals are noise, whose correlation says how many velocities count as one; not those of misplaced cores.
     pub(crate) is_noise_left: bool,
+    /// Whether the stated noise, with the turbulence of the scan, is right, so that covariances follow from it; else they follow from the residuals.
+    pub(crate) is_noise_known: bool,
 }
 
 impl<'a> Stage<'a> {
@@ -154,6 +156,7 @@ impl<'a> Stage<'a> {
             rejected: 0,
             thinned: false,
             is_noise_left: true,
+            is_noise_known: false,
         }
     }
 

@@ -54,7 +54,7 @@ pub use crate::vortex_fit::Top;
 pub use envelope::{EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelopes};
 pub use fit::fit_scan;
 pub use gates::expected_velocities;
-pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
+pub use options::{Gate, Movement, RetrievalOptions, Turbulence};
 pub use plausible::without_implausible_vortices;
 pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, ScanResult, Side, VortexResult};

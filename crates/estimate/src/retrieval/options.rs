@@ -95,15 +95,6 @@ impl Turbulence {
     }
 }
 
-/// How the covariance of a fit is made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Covariance {
-    /// From the residuals and their correlation (sandwich): right for any noise that is much the same over the map.
-    Sandwich,
-    /// The inverse of the information: right if the stated deviations (and the turbulence) are.
-    Model,
-}
-
 /// Whether vortices move while a scan lasts, each with the velocity that the other one, the images and the wind give it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
@@ -140,8 +131,6 @@ pub struct RetrievalOptions {
     pub secondary: Secondary,
     /// Correlated velocities to be whitened.
     pub turbulence: Option<Turbulence>,
-    /// How the covariance is made.
-    pub covariance: Covariance,
     /// Whether the vortices move while the scan lasts.
     pub movement: Movement,
     /// Least statistic (see [`ScanResult::statistic`](crate::retrieval::ScanResult::statistic)) of a wake.
@@ -198,7 +187,6 @@ impl Default for RetrievalOptions {
             loss: Loss::Cauchy { width: 2.385 },
             secondary: Secondary::Auto,
             turbulence: None,
-            covariance: Covariance::Sandwich,
             movement: Movement::Auto,
             threshold: Self::DEFAULT_THRESHOLD,
             threshold_of_estimates: MapFitOptions::default().least_statistic,

@@ -8,7 +8,7 @@ use crate::Measured;
 use crate::error::Error;
 use crate::linalg::positive_definite::solve;
 use crate::retrieval::hypotheses::{End, Kind, Stage, best, least, tops};
-use crate::retrieval::{Covariance, Flag, ScanResult, Side, VortexResult};
+use crate::retrieval::{Flag, ScanResult, Side, VortexResult};
 use crate::vortex_fit::map_fit::least_squares::{Scores, Uncertainty, submatrix};
 use crate::vortex_fit::tolerances::{CERTAIN_SIGMAS, COMPETES, NOT_CONVERGED_SIGMAS};
 use crate::vortex_fit::{Parameter, Top, Wake};
@@ -48,10 +48,7 @@ impl<'a> Report<'a> {
         let likely = least(self.ends, cells);
         let mut of_likely = likely.map(|end| self.uncertainty(end)).transpose()?;
         let alike = match (likely, &of_likely) {
-            (Some(end), Some(known))
-                if self.stage.is_noise_left
-                    && self.stage.options.covariance == Covariance::Sandwich =>
-            {
+            (Some(end), Some(known)) if self.stage.is_noise_left && !self.stage.is_noise_known => {
                 known.excess(&end.wake, self.scale.powi(2))
             }
             _ => 1.0,
@@ -138,11 +135,12 @@ impl<'a> Report<'a> {
     }
 
     fn uncertainty<'b>(&self, end: &'b End) -> Result<Uncertainty<'b>, Error> {
-        let from = match self.stage.options.covariance {
-            Covariance::Model => Scores::Stated,
-            Covariance::Sandwich => Scores::Decaying {
+        let from = if self.stage.is_noise_known {
+            Scores::Stated
+        } else {
+            Scores::Decaying {
                 blocks: self.stage.map.view().blocks(BLOCKS),
-            },
+            }
         };
         self.stage
             .squares

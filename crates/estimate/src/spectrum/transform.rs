@@ -10,13 +10,6 @@ use rustfft::{Fft, FftPlanner};
 
 use crate::window::{Scratch, SignalKind};
 
-/// Forward and inverse transforms of one length, for real or complex samples.
-#[derive(Clone)]
-enum Plans {
-    Real(Arc<dyn RealToComplex<f64>>, Arc<dyn ComplexToReal<f64>>),
-    Complex([Arc<dyn Fft<f64>>; 2]),
-}
-
 /// The forward and the inverse transform of complex numbers.
 pub(crate) fn complex_transforms(length: usize) -> [Arc<dyn Fft<f64>>; 2] {
     let mut planner = FftPlanner::new();
@@ -26,12 +19,12 @@ pub(crate) fn complex_transforms(length: usize) -> [Arc<dyn Fft<f64>>; 2] {
     ]
 }
 
-/// Zero-padded transform of length `padded`.
+/// Forward and inverse transforms of one length, for real or complex samples that zeros fill up to
+/// that length.
 #[derive(Clone)]
-pub(crate) struct WindowTransform {
-    plans: Plans,
-    padded: usize,
-    inner: usize,
+pub(crate) enum WindowTransform {
+    Real(Arc<dyn RealToComplex<f64>>, Arc<dyn ComplexToReal<f64>>),
+    Complex([Arc<dyn Fft<f64>>; 2]),
 }
 
 impl WindowTransform {
@@ -40,39 +33,43 @@ impl WindowTransform {
             SignalKind::Real => {
                 let mut planner = RealFftPlanner::new();
                 let forward = planner.plan_fft_forward(padded);
-                let inverse = planner.plan_fft_inverse(padded);
-                let inner = forward.get_scratch_len().max(inverse.get_scratch_len());
-                Self {
-                    plans: Plans::Real(forward, inverse),
-                    padded,
-                    inner,
-                }
+                Self::Real(forward, planner.plan_fft_inverse(padded))
             }
-            SignalKind::Complex => {
-                let both = complex_transforms(padded);
-                let inner = both[0]
-                    .get_inplace_scratch_len()
-                    .max(both[1].get_inplace_scratch_len());
-                Self {
-                    plans: Plans::Complex(both),
-                    padded,
-                    inner,
-                }
+            SignalKind::Complex => Self::Complex(complex_transforms(padded)),
+        }
+    }
+
+    /// Length of the transforms.
+    fn padded(&self) -> usize {
+        match self {
+            Self::Real(forward, _) => forward.len(),
+            Self::Complex([forward, _]) => forward.len(),
+        }
+    }
+
+    /// Length of the buffer that both transforms need.
+    fn inner(&self) -> usize {
+        match self {
+            Self::Real(forward, inverse) => {
+                forward.get_scratch_len().max(inverse.get_scratch_len())
             }
+            Self::Complex(both) => both[0]
+                .get_inplace_scratch_len()
+                .max(both[1].get_inplace_scratch_len()),
         }
     }
 
     /// Clears `scratch.power` to the number of distinct frequencies: half if real, all if complex.
     pub(crate) fn reset(&self, scratch: &mut Scratch) {
-        let bins = match self.plans {
-            Plans::Real(..) => self.padded / 2 + 1,
-            Plans::Complex(..) => self.padded,
+        let bins = match self {
+            Self::Real(..) => self.padded() / 2 + 1,
+            Self::Complex(..) => self.padded(),
         };
         scratch.power.clear();
         scratch.power.resize(bins, 0.0);
         scratch
             .transform
-            .resize(self.inner.max(scratch.transform.len()), Complex::ZERO);
+            .resize(self.inner().max(scratch.transform.len()), Complex::ZERO);
     }
 
     /// Adds `factor` times the power spectrum of `samples` to `scratch.power`; real transforms take the real parts.
@@ -82,21 +79,22 @@ impl WindowTransform {
         factor: f64,
         scratch: &mut Scratch,
     ) {
-        let inner = &mut scratch.transform[..self.inner];
-        let spectrum = match &self.plans {
-            Plans::Real(forward, _) => {
+        let padded = self.padded();
+        let inner = &mut scratch.transform[..self.inner()];
+        let spectrum = match self {
+            Self::Real(forward, _) => {
                 scratch.real.clear();
                 scratch.real.extend(samples.map(|sample| sample.re));
-                scratch.real.resize(self.padded, 0.0);
-                scratch.half.resize(self.padded / 2 + 1, Complex::ZERO);
+                scratch.real.resize(padded, 0.0);
+                scratch.half.resize(padded / 2 + 1, Complex::ZERO);
                 // the lengths fit by construction, the only error that the transform knows
                 let _ = forward.process_with_scratch(&mut scratch.real, &mut scratch.half, inner);
                 &scratch.half
             }
-            Plans::Complex([forward, _]) => {
+            Self::Complex([forward, _]) => {
                 scratch.complex.clear();
                 scratch.complex.extend(samples);
-                scratch.complex.resize(self.padded, Complex::ZERO);
+                scratch.complex.resize(padded, Complex::ZERO);
                 forward.process_with_scratch(&mut scratch.complex, inner);
                 &scratch.complex
             }
@@ -108,20 +106,21 @@ impl WindowTransform {
 
     /// Inverse transform of `scratch.power`, its first lags written to `out` (as `SignalKind::lag_numbers` says).
     pub(crate) fn lags_of_power(&self, scratch: &mut Scratch, out: &mut [f64]) {
-        let inner = &mut scratch.transform[..self.inner];
+        let padded = self.padded();
+        let inner = &mut scratch.transform[..self.inner()];
         let scaled = scratch
             .power
             .iter()
-            .map(|power| Complex::new(power / self.padded as f64, 0.0));
-        match &self.plans {
-            Plans::Real(_, inverse) => {
+            .map(|power| Complex::new(power / padded as f64, 0.0));
+        match self {
+            Self::Real(_, inverse) => {
                 scratch.half.clear();
                 scratch.half.extend(scaled);
-                scratch.real.resize(self.padded, 0.0);
+                scratch.real.resize(padded, 0.0);
                 let _ = inverse.process_with_scratch(&mut scratch.half, &mut scratch.real, inner);
                 out.copy_from_slice(&scratch.real[..out.len()]);
             }
-            Plans::Complex([_, inverse]) => {
+            Self::Complex([_, inverse]) => {
                 scratch.complex.clear();
                 scratch.complex.extend(scaled);
                 inverse.process_with_scratch(&mut scratch.complex, inner);
