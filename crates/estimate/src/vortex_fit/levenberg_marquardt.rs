@@ -19,6 +19,15 @@ pub(crate) struct Normal {
 /// With a secant curvature, longer steps than this many standard deviations are cut short.
 const LONGEST_SIGMAS: f64 = 4.0;
 
+/// Where the curvature of the cost comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Curvature {
+    /// From the derivatives at each point.
+    Exact,
+    /// From the changes of the gradient between points (a quasi-Newton update), so that a rejected step improves it too.
+    Secant,
+}
+
 /// When an iteration stops.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StoppingRule {
@@ -26,9 +35,7 @@ pub(crate) struct StoppingRule {
     pub(crate) iterations: usize,
     /// The step that remains, in standard deviations of the fit.
     pub(crate) sigmas: f64,
-    /// Whether the curvature comes from the changes of the gradient between points (a quasi-Newton
-    /// update), so that a rejected step improves it too, and not from the derivatives at each point.
-    pub(crate) is_secant: bool,
+    pub(crate) curvature: Curvature,
 }
 
 impl StoppingRule {
@@ -37,7 +44,7 @@ impl StoppingRule {
         Self {
             iterations,
             sigmas,
-            is_secant: false,
+            curvature: Curvature::Exact,
         }
     }
 }
@@ -81,6 +88,7 @@ pub(crate) fn levenberg_marquardt<P: Clone>(
     mut evaluate: impl FnMut(&P) -> Option<Normal>,
     moved: impl Fn(&P, &[f64]) -> P,
 ) -> Option<Minimum<P>> {
+    let is_secant = stop.curvature == Curvature::Secant;
     let mut at = start;
     let mut normal = evaluate(&at)?;
     let mut damping = 1e-3;
@@ -98,7 +106,7 @@ pub(crate) fn levenberg_marquardt<P: Clone>(
         let mut step = damped_step(&normal, &down, damping);
         if let Some(step) = step
             .as_mut()
-            .filter(|_| stop.is_secant && sigmas_left > LONGEST_SIGMAS)
+            .filter(|_| is_secant && sigmas_left > LONGEST_SIGMAS)
         {
             step.iter_mut()
                 .for_each(|s| *s *= LONGEST_SIGMAS / sigmas_left);
@@ -119,7 +127,7 @@ pub(crate) fn levenberg_marquardt<P: Clone>(
                 normal = trial_normal;
             }
             (_, rejected) => {
-                if let Some(rejected) = rejected.filter(|_| stop.is_secant) {
+                if let Some(rejected) = rejected.filter(|_| is_secant) {
                     normal.curvature = rejected.curvature;
                 }
                 damping = (damping * 10.0).max(1e-4);
