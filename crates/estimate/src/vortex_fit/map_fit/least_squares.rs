@@ -235,11 +235,15 @@ impl LeastSquares<'_> {
 
     /// Velocities that count as one, from the correlation of the residuals over at most so many lines.
     pub(crate) fn alike(&self, p: &[f64], lines: usize) -> f64 {
-        let mut rows = self.rows(p, &[]);
-        for residual in &mut rows.residuals {
+        let mut residuals = self.rows(p, &[]).residuals;
+        for residual in &mut residuals {
             *residual *= self.loss.at(*residual).1;
         }
-        of_neighbours(&self.cells, &rows, &Array2::zeros((0, 0)), lines).1
+        let weighted = Rows {
+            residuals,
+            slopes: Vec::new(),
+        };
+        of_neighbours(&self.cells, &weighted, &Array2::zeros((0, 0)), lines).1
     }
 
     /// What the map tells of the free numbers at a minimum.
