@@ -117,8 +117,9 @@ fn files_of_scan(cases: &Cases, case: &ScanCase, folder: &Path) -> Result<Vec<Se
     let plan = wakescope_sim::Plan::new(scene, wakescope_sim::Target::Map)?;
     let scan = Scan::new(plan, case)?;
     let mut files = Vec::new();
-    // Names of the truth, first and last ray of the files that share it, and their cases.
-    let mut truths: BTreeMap<String, ((usize, usize), BTreeMap<String, u32>)> = BTreeMap::new();
+    // By the name of the truth, the files that share it with their cases, and their first and last ray.
+    let mut truths: BTreeMap<String, BTreeMap<String, u32>> = BTreeMap::new();
+    let mut rays_by_truth = BTreeMap::new();
     for (name, number) in &case.files {
         let turns = if name.contains('N') {
             scan.map.sweeps.len()
@@ -143,16 +144,16 @@ fn files_of_scan(cases: &Cases, case: &ScanCase, folder: &Path) -> Result<Vec<Se
                 }
                 _ => content(&scan, case, &name, turn)?,
             };
-            let rays = rays_of_turn(&scan, turn, turns);
-            let entry = truths.entry(truth_stem(&name).to_owned());
-            entry
-                .or_insert((rays, BTreeMap::new()))
-                .1
-                .insert(name, *number);
+            let stem = truth_stem(&name).to_owned();
+            rays_by_truth
+                .entry(stem.clone())
+                .or_insert_with(|| rays_of_turn(&scan, turn, turns));
+            truths.entry(stem).or_default().insert(name, *number);
             files.push(file);
         }
     }
-    for (stem, (rays, of_truth)) in truths {
+    for (stem, of_truth) in truths {
+        let rays = rays_by_truth[&stem];
         let case = of_truth.values().copied().min().unwrap_or_default();
         let gates_before = if stem.ends_with(".hpl") {
             gates_before(&scan.map)

@@ -726,7 +726,15 @@ mod tests {
                 ..
             })
         ));
-        let response = response(&statistic, &peak, (Noise::White, 1.0), 2.0);
+        let noise = (Noise::White, 1.0);
+        assert!(matches!(
+            EstimatorResponse::new(&statistic, &peak, &sampling(), 0.0, noise, 2.0),
+            Err(Error::OutOfRange {
+                field: "pulse_sigma_s",
+                ..
+            })
+        ));
+        let response = response(&statistic, &peak, noise, 2.0);
         let map = response.map(&WakeModel::default(), &wake(), &LINES_RAD, &[400.0, 390.0]);
         assert!(matches!(
             map,

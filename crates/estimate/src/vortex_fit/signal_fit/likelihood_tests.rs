@@ -314,6 +314,17 @@ fn rays_with_missing_samples_are_left_out_and_impossible_input_is_refused() {
         ScanModel::new(&setup, |_, _| f64::NAN, &wake()),
         Err(Error::OutOfRange { field: "snr", .. })
     ));
+    let no_pulse = ScanSetup {
+        pulse_sigma_s: 0.0,
+        ..setup.clone()
+    };
+    assert!(matches!(
+        ScanModel::new(&no_pulse, snr, &wake()),
+        Err(Error::OutOfRange {
+            field: "pulse_sigma_s",
+            ..
+        })
+    ));
     let rayless = ScanSetup {
         elevation_rad: vec![],
         ..setup
