@@ -79,7 +79,8 @@ pub(crate) fn samples(array: &Bound<'_, PyAny>) -> PyResult<RawRecords> {
         are_integers,
     );
     if kind == "u" && bytes <= 4 {
-        out.zero = middle_code(8 * bytes);
+        let zero = middle_code(8 * bytes);
+        out.zero = Complex::new(zero, zero);
     }
     Ok(out)
 }
