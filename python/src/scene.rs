@@ -29,10 +29,7 @@ pub(crate) fn scene<'py>(
         Some(name) => preset_toml(name).ok_or_else(|| {
             let known: Vec<&str> = preset_names().collect();
             let allowed = format!("one of {}", known.join(", "));
-            raised(
-                py,
-                &refusal_of_value(Problem::new("preset", name, allowed)),
-            )
+            raised(py, &refusal_of_value(Problem::new("preset", name, allowed)))
         })?,
     };
     let mut table: Table =
