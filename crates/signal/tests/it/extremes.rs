@@ -78,9 +78,7 @@ fn layers_too_thick_for_the_pulse_are_refused_with_the_thickness() {
         400.0,
         16
     )));
-    let thin_m = Pulse::from(steep.clone())
-        .layer_thickness_m(limits(0.0))
-        .unwrap();
+    let thin_m = steep.clone().layer_thickness_m(limits(0.0)).unwrap();
     let thin = line(340.0, 430.0, thin_m, |_| 1.0);
     assert!(
         current(&simulator(steep, NoiseModel::None, 400.0, 16), &thin, 1)
