@@ -3,7 +3,7 @@
 //!
 //! | file | what is in it |
 //! |---|---|
-//! | `wind` | the trait [`Wind`]; [`SampledLine`]; [`Sum`] |
+//! | `wind` | the trait [`Wind`]; [`SampledLine`]; sums of winds |
 //! | `profile` | circulation against radius of one vortex, (3), (4); the two-scale profile |
 //! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
 //! | `decay` | lifetime and decay laws of a pair |
