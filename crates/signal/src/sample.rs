@@ -58,7 +58,7 @@ pub trait Sample: Copy + Default + Send + Sync + LinalgScalar + ComplexFloat<Rea
     #[doc(hidden)]
     fn normal<R: Rng + ?Sized>(rng: &mut R) -> Self;
 
-    /// Root of the sum of the squares of so many normal numbers.
+    /// Root of the sum of the squares of `numbers` normal numbers.
     #[doc(hidden)]
     fn root_of_squares<R: Rng + ?Sized>(numbers: usize, rng: &mut R) -> Self;
 

@@ -32,9 +32,16 @@ fn table2_weight(range_m: f64) -> f64 {
 #[test]
 fn fast_sum_agrees_with_the_literal_one_for_any_layers_masks_and_lengths() {
     let mut scratch = Scratch::default();
-    // Layers that divide the step, that do not, and that are thicker; the line covers part of
-    // the record only.
-    for (samples, thickness) in [(700, STEP_M), (700, STEP_M / 3.0), (300, 0.37), (1500, 0.9)] {
+    // Layers that divide the step, that do not, that hold several samples, and that are thicker;
+    // the line covers part of the record only.
+    for (samples, thickness) in [
+        (700, STEP_M),
+        (700, STEP_M / 3.0),
+        (701, 2.0 * STEP_M),
+        (701, 4.0 * STEP_M),
+        (300, 0.37),
+        (1500, 0.9),
+    ] {
         let simulator = simulator(200.0, samples);
         let velocity = |r: f64| {
             if (330.0..350.0).contains(&r) {

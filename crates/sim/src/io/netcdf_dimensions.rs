@@ -5,11 +5,8 @@
 //! Check: the readers of initial fields and of cross-planes, with files of several programs.
 
 use super::netcdf_input::{NetcdfFile, own_name, presentable};
-use super::units::Quantity;
+use super::units::{FASTEST_M_S, Quantity};
 use ndarray::{ArrayD, Axis};
-
-/// Velocities that no air has, m/s.
-const FASTEST_M_S: f64 = 500.0;
 
 /// What a dimension is for: its name here, its letter in the attribute `axis`, and other names for it.
 #[derive(Debug, Clone, Copy)]

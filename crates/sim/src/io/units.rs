@@ -2,6 +2,9 @@
 //!
 //! Check: common spellings, and words that are no such unit.
 
+/// Velocities that no air has, m/s: their unit is another one, or a fill value was not named.
+pub(crate) const FASTEST_M_S: f64 = 500.0;
+
 /// What is measured: powers of length, time and angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Quantity {

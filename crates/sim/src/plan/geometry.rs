@@ -12,12 +12,12 @@ use wakescope_signal::{LayerLimits, Pulse};
 
 /// Layers of scenes with a transported pair are this many times as thick as the rule of [`Pulse::layer_thickness_m`] has them, that is
 /// `D = lambda/(8 sigma g)`. In a gradient `g` all along a pulse a sum over layers misses `exp(-(lambda/(4 sigma g D))^2)` of the power
-/// in the covariance of a record, 2 % (`measure/scan/layers.rs`); in a core, which is smaller than the pulse, less.
+/// in the covariance of a record of a Gaussian pulse, 2 % (`measure/scan/layers.rs`); in a core, which is smaller than the pulse, less.
 const TRANSPORTED_THICKNESS: f64 = 2.0;
 /// Numbers of samples that layers may hold where winds change little along a line.
 const SAMPLES_PER_LAYER: [f64; 2] = [4.0, 2.0];
-/// Layers of several samples are at most this fraction of the shortest wavelength of eddies: their variance in a pulse is then kept,
-/// and their mean over it is negligible.
+/// Layers of several samples are at most this fraction of the shortest wavelength of eddies. Sampled at these distances waves keep
+/// their variance, and appear at most 1/(1/0.6 - 1) = 1.5 times as long as the shortest (`measure/scan/layers.rs`).
 const EDDY_FRACTION: f64 = 0.6;
 
 /// The sampling of one scan in angle, range and time.

@@ -401,7 +401,7 @@ impl<'a> Correlogram<'a> {
     }
 }
 
-/// B, and the number of cells that count as one, from the correlogram of the weighted residuals over at most so many `lines`; `bread` is A^-1.
+/// B, and the number of cells that count as one, from the correlogram of the weighted residuals over at most `lines` lines; `bread` is A^-1.
 pub(crate) fn of_neighbours(
     cells: &[Cell],
     all: &Rows,

@@ -25,7 +25,7 @@ impl<'f> GateLayout<'f> {
     /// The layout of a file whose velocities are the variable `name`.
     ///
     /// # Errors
-    /// Velocities that are not those of so many rays and gates.
+    /// Velocities of another number of rays or gates.
     pub(super) fn new(
         file: &'f NetcdfFile,
         name: &str,
@@ -197,7 +197,7 @@ mod tests {
     use crate::io::netcdf_input::open;
     use crate::io::provenance::example;
 
-    /// A file of so many rays and gates with the variable `v` over these dimensions.
+    /// A file with these numbers of rays and gates, and the variable `v` over these dimensions.
     fn file(
         [rays, gates]: [usize; 2],
         along: &'static [&'static str],

@@ -3,6 +3,7 @@
 //! Check: lines of one elevation; what makes no map.
 
 use super::planes::FEWEST_LINES;
+use crate::io::units::FASTEST_M_S;
 use ndarray::Array2;
 use wakescope_estimate::retrieval::ScanMap;
 
@@ -24,8 +25,6 @@ const FARTHEST_M: f64 = 1e6;
 const NEAREST_M: f64 = 10.0;
 /// Least width of a scan at its farthest gate, m: none of a vortex fits into less.
 const NARROWEST_M: f64 = 5.0;
-/// Velocities that no air has, m/s: their unit is another one, or a fill value was not named.
-const FASTEST_M_S: f64 = 500.0;
 /// Velocities of one value beyond this are missing ones, m/s.
 const FAST_M_S: f64 = 90.0;
 /// Fewest gates and velocities of a map.

@@ -8,6 +8,7 @@ use super::grid::{RayRow, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::UtcTime;
+use crate::io::units::FASTEST_M_S;
 use crate::io::utc::DAY_S;
 use crate::io::variable::not_understood;
 use std::path::Path;
@@ -16,8 +17,6 @@ use std::path::Path;
 const OVERLAP_STEP_M: f64 = 3.0;
 /// Intensities above 1 by this many standard deviations of those below 1 are no noise.
 const SIGMAS_ABOVE_NOISE: f64 = 4.0;
-/// Fill values, which a HALO file cannot name, are larger than this in size (-999, 9999).
-const MISSING: f64 = 500.0;
 /// Most gates of a ray.
 const MOST_GATES: usize = 1_000_000;
 
@@ -171,8 +170,8 @@ fn rays(header: &Header, lines: &[(usize, &str)]) -> Result<(Vec<RayRow>, Vec<Ve
                     number + 1
                 )
             })?;
-            // No instrument measures such velocities, and no ratio plus 1 is far below 0: they stand for missing ones.
-            if row[1].abs() < MISSING && row[2] > -MISSING {
+            // A HALO file cannot name its fill values (-999, 9999): no air is as fast, and no ratio plus 1 is below 0 by as much.
+            if row[1].abs() < FASTEST_M_S && row[2] > -FASTEST_M_S {
                 velocity_m_s[gate] = row[1];
                 intensity[gate] = row[2];
             }
