@@ -10,7 +10,7 @@
 //! Check: energy and momentum without viscosity, orders in space and time, exact solutions, bits
 //! against threads and restart.
 
-use momentum_rhs::{PredictedField, Prediction};
+use momentum_rhs::Prediction;
 use rayon::prelude::*;
 
 mod momentum_rhs;
@@ -205,7 +205,7 @@ impl Flow {
                 old: 0.0,
             },
             stage_s: 1.0,
-            field: PredictedField::Increment,
+            is_increment: true,
             measures_powers: false,
         })?;
         for terms in &mut self.state.previous_terms {
@@ -304,11 +304,7 @@ impl Flow {
     fn advance(&mut self, step_s: f64) -> Result<(Powers, Option<Solved>), Error> {
         let has_history = self.state.last_step_s > 0.0;
         let ratio = has_history.then(|| step_s / self.state.last_step_s);
-        let field = if self.state.implicit == [false; 3] {
-            PredictedField::Velocity
-        } else {
-            PredictedField::Increment
-        };
+        let is_increment = self.state.implicit != [false; 3];
         // The first step of Adams-Bashforth is one of Runge-Kutta, after which the history is the
         // terms of the initial field.
         let takes_first_terms = self.settings.scheme == TimeScheme::AdamsBashforth2 && !has_history;
@@ -322,7 +318,7 @@ impl Flow {
             let stage_powers = self.predict(Prediction {
                 stage,
                 stage_s,
-                field,
+                is_increment,
                 measures_powers: is_first,
             })?;
             if is_first {

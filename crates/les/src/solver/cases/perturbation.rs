@@ -17,32 +17,18 @@ const BACKGROUND_WAVES: usize = 128;
 /// Highest axial wave number of the noise, in wave lengths per length of the box.
 const AXIAL: usize = 8;
 
-/// Where a disturbance is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Envelope {
-    /// Between the ground and 1.6 `b0`, within 1.6 `b0` of the middle.
-    Wake,
-    /// Everywhere but at the ground and the top, at this height.
-    Box(f64),
-}
-
-impl Envelope {
-    /// `g` and its slopes along y and z.
-    fn at(self, y: f64, z: f64) -> [f64; 3] {
-        let (near, near_slope) = rise(z);
-        match self {
-            Self::Wake => {
-                let far = (-(z / 1.6).powi(8) - (y / 1.6).powi(8)).exp();
-                let g = near * far;
-                let [by_y, by_z] = [y, z].map(|x| -8.0 * x.powi(7) / 1.6_f64.powi(8) * g);
-                [g, by_y, near_slope * far + by_z]
-            }
-            Self::Box(height) => {
-                let (top, top_slope) = rise(height - z);
-                [near * top, 0.0, near_slope * top - near * top_slope]
-            }
-        }
+/// `g` and its slopes along y and z: everywhere but at the ground and the top at `top`, or without
+/// a top between the ground and 1.6 `b0`, within 1.6 `b0` of the middle.
+fn envelope(top: Option<f64>, y: f64, z: f64) -> [f64; 3] {
+    let (near, near_slope) = rise(z);
+    if let Some(height) = top {
+        let (top, top_slope) = rise(height - z);
+        return [near * top, 0.0, near_slope * top - near * top_slope];
     }
+    let far = (-(z / 1.6).powi(8) - (y / 1.6).powi(8)).exp();
+    let g = near * far;
+    let [by_y, by_z] = [y, z].map(|x| -8.0 * x.powi(7) / 1.6_f64.powi(8) * g);
+    [g, by_y, near_slope * far + by_z]
 }
 
 /// The rise of an envelope from a plane at the distance `d`, and its slope.
@@ -64,7 +50,8 @@ struct Wave {
 /// A disturbance in the units of the pair.
 #[derive(Debug, Clone)]
 pub(super) struct Perturbation {
-    envelope: Envelope,
+    /// Height of the box that it fills; none of one about the wake alone.
+    top: Option<f64>,
     waves: Vec<Wave>,
 }
 
@@ -97,10 +84,7 @@ impl Perturbation {
                 }
             }
         }
-        let raw = Self {
-            envelope: Envelope::Wake,
-            waves,
-        };
+        let raw = Self { top: None, waves };
         raw.scaled_to(rms, &points)
     }
 
@@ -110,7 +94,7 @@ impl Perturbation {
     pub(super) fn background(size: [f64; 3], rms: f64, seed: u64) -> Self {
         let [_, width, height] = size;
         let raw = Self {
-            envelope: Envelope::Box(height),
+            top: Some(height),
             waves: (0..BACKGROUND_WAVES)
                 .map(|n| background_wave(n, size, seed))
                 .collect(),
@@ -153,7 +137,7 @@ impl Perturbation {
     /// Coefficients of `cos(2 pi m x/L)` and `sin(2 pi m x/L)`, m = 0, 1, ..., of a velocity
     /// component at `(y, z)`.
     pub(super) fn row(&self, component: usize, y: f64, z: f64) -> Vec<[f64; 2]> {
-        let [g, by_y, by_z] = self.envelope.at(y, z);
+        let [g, by_y, by_z] = envelope(self.top, y, z);
         let slope = [0.0, by_y, by_z];
         // u_c = d_a A_b - d_b A_a with (c, a, b) cyclic.
         let a = (component + 1) % 3;

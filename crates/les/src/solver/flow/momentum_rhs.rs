@@ -21,33 +21,15 @@ const SUBGRID_FRACTION: f64 = 0.8;
 /// cache of a core.
 const BLOCK: usize = 4096;
 
-/// What the prediction of a stage writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum PredictedField {
-    /// The right side of (22): the increment for which the line solves of implicit viscosity
-    /// follow.
-    Increment,
-    /// The velocity after all terms but implicit viscosity.
-    Velocity,
-}
-
-impl PredictedField {
-    /// Weight of the present velocity in it.
-    fn velocity_weight(self) -> f64 {
-        match self {
-            Self::Increment => 0.0,
-            Self::Velocity => 1.0,
-        }
-    }
-}
-
 /// How one stage is predicted.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prediction {
     pub(super) stage: Stage,
     /// Length of the stage \[s\].
     pub(super) stage_s: f64,
-    pub(super) field: PredictedField,
+    /// Whether it writes the right side of (22), the increment for which the line solves of
+    /// implicit viscosity follow; otherwise the velocity after all terms but implicit viscosity.
+    pub(super) is_increment: bool,
     /// Whether the work of the terms is measured.
     pub(super) measures_powers: bool,
 }
@@ -181,9 +163,10 @@ impl Flow {
     ) -> [Powers; 3] {
         let n = self.layout.shape.n[0];
         let k = block.plane;
-        let implicit_viscosity_m2_s = match prediction.field {
-            PredictedField::Increment => self.settings.viscosity_m2_s,
-            PredictedField::Velocity => 0.0,
+        let implicit_viscosity_m2_s = if prediction.is_increment {
+            self.settings.viscosity_m2_s
+        } else {
+            0.0
         };
         let mut powers = [Powers::default(); 3];
         let components = block.predicted.into_iter().zip(block.previous);
@@ -289,7 +272,7 @@ fn advance_row(
 ) {
     let Stage { new, old, .. } = prediction.stage;
     let stage_s = prediction.stage_s;
-    let velocity_weight = prediction.field.velocity_weight();
+    let velocity_weight = if prediction.is_increment { 0.0 } else { 1.0 };
     let n = predicted.len();
     let previous = &mut previous[..n];
     let implicit = &implicit[..n];

@@ -33,12 +33,8 @@ struct Column {
     mass: f64,
 }
 
-/// Factors of one column: inverse pivot and the entries of `L`.
-#[derive(Debug, Clone, Copy)]
-struct Factor {
-    below: [Lanes; 3],
-    corner: Lanes,
-}
+/// Entries 1 to 4 of a column of `L` below its diagonal.
+type Factor = [Lanes; 4];
 
 /// Space that a thread needs.
 #[derive(Debug, Default)]
@@ -90,13 +86,7 @@ impl BandedCholesky {
             self.remove_mean(rows, l, |column| column.mass);
         }
         let n = self.columns.len();
-        scratch.factors.resize(
-            n,
-            Factor {
-                below: [ZERO; 3],
-                corner: ZERO,
-            },
-        );
+        scratch.factors.resize(n, [ZERO; 4]);
         scratch.right.resize(n, ZERO);
         for (shifts, start) in shifts.chunks(LANES).zip((0..).step_by(LANES)) {
             let range = start..start + shifts.len();
@@ -183,10 +173,7 @@ fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratc
             subtract_reach(&mut current, reach);
         }
         reach = reach.filter(|reach| reach.remaining > 0);
-        let mut factor = Factor {
-            below: [ZERO; 3],
-            corner: ZERO,
-        };
+        let mut factor = [ZERO; 4];
         for l in 0..LANES {
             // The constant is free where the shift is zero.
             let inverse = if k == last && shift[l] == 0.0 {
@@ -194,10 +181,10 @@ fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratc
             } else {
                 1.0 / current.diagonal[l]
             };
-            factor.below[0][l] = current.undivided[0][l] * inverse;
-            factor.below[1][l] = current.undivided[1][l] * inverse;
-            factor.below[2][l] = current.undivided[2][l] * inverse;
-            factor.corner[l] = column.corner * inverse;
+            factor[0][l] = current.undivided[0][l] * inverse;
+            factor[1][l] = current.undivided[1][l] * inverse;
+            factor[2][l] = current.undivided[2][l] * inverse;
+            factor[3][l] = column.corner * inverse;
             right[l] = current.value[l] * inverse;
         }
         if column.corner != 0.0 {
@@ -208,7 +195,7 @@ fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratc
                 value: current.value,
             });
         }
-        current.divided = factor.below;
+        current.divided = [factor[0], factor[1], factor[2]];
         before[k % 3] = current;
         scratch.factors[k] = factor;
     }
@@ -250,13 +237,13 @@ fn subtract_reach(current: &mut Reduced, reach: &mut Reach) {
     reach.remaining -= 1;
     if reach.remaining == 0 {
         for l in 0..LANES {
-            current.diagonal[l] -= reach.entry[l] * reach.factor.corner[l];
-            current.value[l] -= reach.factor.corner[l] * reach.value[l];
+            current.diagonal[l] -= reach.entry[l] * reach.factor[3][l];
+            current.value[l] -= reach.factor[3][l] * reach.value[l];
         }
         return;
     }
     let entry = &mut current.undivided[reach.remaining - 1];
-    let factor = &reach.factor.below[3 - reach.remaining];
+    let factor = &reach.factor[3 - reach.remaining];
     for l in 0..LANES {
         entry[l] -= reach.entry[l] * factor[l];
     }
@@ -272,10 +259,10 @@ fn substitute(scratch: &mut Scratch) {
     let mut x = [ZERO; 4];
     for (factor, right) in scratch.factors.iter().zip(&mut scratch.right).rev() {
         for l in 0..LANES {
-            let b = (-factor.below[2][l]).mul_add(x[2][l], right[l]);
-            let b = (-factor.below[1][l]).mul_add(x[1][l], b);
-            let b = (-factor.corner[l]).mul_add(x[3][l], b);
-            right[l] = (-factor.below[0][l]).mul_add(x[0][l], b);
+            let b = (-factor[2][l]).mul_add(x[2][l], right[l]);
+            let b = (-factor[1][l]).mul_add(x[1][l], b);
+            let b = (-factor[3][l]).mul_add(x[3][l], b);
+            right[l] = (-factor[0][l]).mul_add(x[0][l], b);
         }
         x = [*right, x[0], x[1], x[2]];
     }

@@ -36,12 +36,8 @@ pub(crate) struct PackedMatrix {
     after: Vec<[usize; 2]>,
 }
 
-/// Space for one packed operand.
-#[derive(Debug, Default)]
-pub(crate) struct Panels {
-    columns: Vec<TileRow>,
-    product: Vec<TileRow>,
-}
+/// Space for one packed operand and for the product with it.
+pub(crate) type Panels = [Vec<TileRow>; 2];
 
 impl PackedMatrix {
     /// The transpose of a matrix with the columns in the order of `fold`.
@@ -66,7 +62,7 @@ impl PackedMatrix {
 
     /// Replaces the `n` rows `f` of equal length by `A f`.
     pub(crate) fn apply(&self, f: &mut [&mut [f64]], packed: &mut Panels) {
-        let (panel, product) = packed.panels(self.n);
+        let [panel, product] = resized(packed, self.n);
         for columns in panels(f) {
             load_panel(&self.before, f, columns, panel);
             self.multiply(panel, columns, product);
@@ -77,7 +73,7 @@ impl PackedMatrix {
     /// Replaces each row `f` of `n` values, all of which follow one another, by `A f`; of a matrix
     /// without symmetries.
     pub(crate) fn apply_to_rows(&self, f: &mut [f64], packed: &mut Panels) {
-        let (panel, product) = packed.panels(self.n);
+        let [panel, product] = resized(packed, self.n);
         for rows in f.chunks_mut(COLUMNS * self.n) {
             for (i, row) in rows.chunks(self.n).enumerate() {
                 panel
@@ -132,13 +128,12 @@ fn packed_blocks(
     blocks
 }
 
-impl Panels {
-    /// Two panels of `n` rows.
-    fn panels(&mut self, n: usize) -> (&mut [TileRow], &mut [TileRow]) {
-        self.columns.resize(n, [0.0; COLUMNS]);
-        self.product.resize(n, [0.0; COLUMNS]);
-        (&mut self.columns[..n], &mut self.product[..n])
-    }
+/// Two panels of `n` rows.
+fn resized(packed: &mut Panels, n: usize) -> [&mut [TileRow]; 2] {
+    packed.each_mut().map(|rows| {
+        rows.resize(n, [0.0; COLUMNS]);
+        &mut rows[..]
+    })
 }
 
 /// First column of each panel of `f`, and the one after its last.

@@ -19,17 +19,6 @@ use super::super::rows::{HALO, cut_rows, pad};
 use super::operators::{Operators, Row};
 use crate::solver::aligned::Aligned;
 
-#[derive(Debug)]
-struct Scratch {
-    /// `tau_01` of a plane.
-    shear: Vec<f64>,
-    /// `tau_11` of a plane.
-    normal: Vec<f64>,
-    row: Vec<f64>,
-    viscosity: Vec<f64>,
-    padded: Vec<f64>,
-}
-
 /// The stress by the viscosity at the centres and the strain of `velocity`: `across` gets `tau_02`,
 /// `tau_12` at the edges and `tau_22` at the centres \[m^2/s^2\], `in_plane` the acceleration of
 /// each component by the stresses whose divergence is taken along the axes 0 and 1 \[m/s^2\].
@@ -52,13 +41,7 @@ pub(super) fn update_stress(
     (a0, a1, a2, t0, t1, t2, shape.own())
         .into_par_iter()
         .for_each_init(
-            || Scratch {
-                shear: vec![0.0; plane],
-                normal: vec![0.0; plane],
-                row: vec![0.0; n],
-                viscosity: vec![0.0; n],
-                padded: vec![0.0; n + 2 * HALO],
-            },
+            || [plane, plane, n, n, n + 2 * HALO].map(|length| vec![0.0; length]),
             |scratch, (a0, a1, a2, t0, t1, t2, k)| {
                 stress_plane(
                     operators,
@@ -85,7 +68,8 @@ pub(super) fn add_divergence_row(
     operator.add_across(out, across, at);
 }
 
-/// The stresses of plane `k` and the acceleration by those in it.
+/// The stresses of plane `k` and the acceleration by those in it. Of the buffers `shear` holds
+/// `tau_01` and `normal` `tau_11` of the plane, the others rows.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn stress_plane(
     operators: &Operators,
@@ -94,13 +78,7 @@ fn stress_plane(
     k: usize,
     [in_0, in_1, in_2]: [&mut [f64]; 3],
     [across_0, across_1, across_2]: [&mut [f64]; 3],
-    Scratch {
-        shear,
-        normal,
-        row: diagonal,
-        viscosity: sum,
-        padded,
-    }: &mut Scratch,
+    [shear, normal, diagonal, sum, padded]: &mut [Vec<f64>; 5],
 ) {
     let shape = operators.shape;
     let n = shape.n[0];
