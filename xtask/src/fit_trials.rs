@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use trial::FitTrial;
 use wakescope_estimate::vortex_fit::{
     CorePrior, FreeParameters, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit,
-    Starts, Wake,
+    SignalFitOptions, Wake,
 };
 use wakescope_signal::NoiseModel;
 
@@ -225,13 +225,18 @@ impl Trials {
 
     /// Fits the signals of a scan from a guess and from the truth, and compares the likelihoods.
     fn fit_signals(&mut self, trial: &FitTrial, scan: usize, guess: &Wake) -> Outcome {
-        let free = self.free(Sharing::Common);
+        let options = SignalFitOptions {
+            free: self.free(Sharing::Common),
+            ..Default::default()
+        };
         let truth = self.case.truth();
-        let fit = fit_signals(&mut self.signals, scan, || {
-            trial.signals(free, guess, Starts::Several)
-        })?;
+        let fit = fit_signals(&mut self.signals, scan, || trial.signals(guess, &options))?;
+        let alone = SignalFitOptions {
+            several_starts: false,
+            ..options
+        };
         let from_truth = fit_signals(&mut self.signals_from_truth, scan, || {
-            trial.signals(free, &truth, Starts::Guess)
+            trial.signals(&truth, &alone)
         })?;
         let (Some(fit), Some(from_truth)) = (fit, from_truth) else {
             return Ok(());

@@ -9,10 +9,11 @@ mod sample_data;
 
 use sample_data::{map, origin, wind};
 use std::path::Path;
-use wakescope_sim::io::{FileGroup, OutputResult};
+use wakescope_sim::Error;
+use wakescope_sim::io::FileGroup;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 
-fn main() -> OutputResult<()> {
+fn main() -> Result<(), Error> {
     let folder = std::env::args()
         .nth(1)
         .unwrap_or_else(|| "target/sample-figures".into());
@@ -33,7 +34,7 @@ fn main() -> OutputResult<()> {
 }
 
 /// An early and a late map, and the spread of the estimate below.
-fn maps() -> OutputResult<Figure> {
+fn maps() -> Result<Figure, Error> {
     let map = map(&[2.5, 5.0], true);
     let mut early = MapPlot::new(&map, 0, "radial_velocity")?
         .titled("estimated velocity, τ = 2.5")

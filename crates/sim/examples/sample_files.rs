@@ -9,10 +9,11 @@ mod sample_data;
 
 use sample_data::{map, origin, planes};
 use std::path::Path;
+use wakescope_sim::Error;
 use wakescope_sim::io::tables::{map_table, planes_table};
-use wakescope_sim::io::{FileGroup, OutputResult, Table, VelocityMap};
+use wakescope_sim::io::{FileGroup, Table, VelocityMap};
 
-fn main() -> OutputResult<()> {
+fn main() -> Result<(), Error> {
     let folder = std::env::args()
         .nth(1)
         .unwrap_or_else(|| "target/sample-files".into());
@@ -42,7 +43,7 @@ fn main() -> OutputResult<()> {
 }
 
 /// What an `.hpl` file holds: velocity and signal-to-noise ratio of one sweep.
-fn halo_table(map: &VelocityMap) -> OutputResult<Table> {
+fn halo_table(map: &VelocityMap) -> Result<Table, Error> {
     let mut map = map.clone();
     map.fields
         .retain(|f| ["radial_velocity", "signal_to_noise_ratio"].contains(&f.name.as_str()));

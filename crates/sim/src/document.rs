@@ -1,7 +1,8 @@
 //! A checked scene or case, with its file, its hash and the lines of its keys.
 
+use crate::Error;
 use crate::io::{Provenance, hash_of, text_file};
-use crate::keys::{Problem, SceneError, Text};
+use crate::keys::{Problem, Text};
 use std::path::{Path, PathBuf};
 
 /// What a file says: a scene or a case.
@@ -9,8 +10,8 @@ pub trait Content: Sized {
     /// Reads and checks a text; `path` serves the messages.
     ///
     /// # Errors
-    /// [`SceneError`] names the file, the line, the key, the value and what is allowed.
-    fn parse(text: &str, path: &Path) -> Result<Self, SceneError>;
+    /// [`Error`] names the file, the line, the key, the value and what is allowed.
+    fn parse(text: &str, path: &Path) -> Result<Self, Error>;
 
     /// The same as TOML, every default written out.
     fn to_toml(&self) -> String;
@@ -37,9 +38,9 @@ impl<T: Content> Document<T> {
     /// Reads and checks a file.
     ///
     /// # Errors
-    /// [`SceneError`] names the file, the line, the key, the value and what is allowed.
-    pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let text = text_file::read(path).map_err(|source| SceneError::Unreadable {
+    /// [`Error`] names the file, the line, the key, the value and what is allowed.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = text_file::read(path).map_err(|source| Error::Unreadable {
             path: path.to_owned(),
             source,
         })?;
@@ -51,7 +52,7 @@ impl<T: Content> Document<T> {
     ///
     /// # Errors
     /// As [`Document::read`].
-    pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
+    pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
         Ok(Self::of(T::parse(text, path)?, path, text))
     }
 
@@ -93,7 +94,7 @@ impl<T: Content> Document<T> {
     }
 
     /// Problems that are found later, with the lines of the file.
-    pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
+    pub(crate) fn located(&self, problems: Vec<Problem>) -> Error {
         match Text::parse(&self.text, &self.path) {
             Ok(text) => text.located(problems),
             Err(error) => error,
@@ -101,8 +102,8 @@ impl<T: Content> Document<T> {
     }
 
     /// Problems of requests beside the file.
-    pub(crate) fn refused(&self, problems: Vec<Problem>) -> SceneError {
-        SceneError::Invalid {
+    pub(crate) fn refused(&self, problems: Vec<Problem>) -> Error {
+        Error::Invalid {
             path: self.path.clone(),
             problems,
         }

@@ -1,15 +1,38 @@
 //! What can go wrong in a run.
 
-use crate::keys::{Problem, SceneError};
+use crate::keys::{Problem, listed};
 use std::path::PathBuf;
 
 /// Why a run could not be made or finished.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The scene was refused.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
+    /// The file of a scene or a case cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The text of a scene or a case is no TOML.
+    #[error("{}:{line}: {message}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong and what is allowed.
+        message: String,
+    },
+    /// A scene or a case with unknown or missing keys, values of the wrong kind or out of their limits.
+    #[error("{}", listed(path, problems))]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// All of them, in the order of their lines.
+        problems: Vec<Problem>,
+    },
     /// The wind refused a point or a time.
     #[error("wind: {0}")]
     Wind(#[from] wakescope_les::Error),
@@ -125,9 +148,74 @@ pub enum Error {
     /// An estimator refused its input.
     #[error("estimate: {0}")]
     Estimate(#[from] wakescope_estimate::Error),
-    /// A file could not be written.
-    #[error(transparent)]
-    Export(#[from] crate::io::OutputError),
+    /// A table or field has another size than its axes.
+    #[error("{field}: length {actual}, but {expected} is needed to match {axis}")]
+    Length {
+        /// Column, field or axis that does not fit.
+        field: String,
+        /// What it has to match.
+        axis: String,
+        /// Length needed.
+        expected: usize,
+        /// Length found.
+        actual: usize,
+    },
+    /// A value is outside what the format or the drawing can hold.
+    #[error("{field} = {value}: {allowed}")]
+    Value {
+        /// Field that holds the value.
+        field: String,
+        /// The value as text.
+        value: String,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// Two columns, fields or files share a name.
+    #[error("{what} '{name}' appears twice: names must differ")]
+    Duplicate {
+        /// Kind of thing (column, field, file).
+        what: &'static str,
+        /// The repeated name.
+        name: String,
+    },
+    /// Something that the format needs is not there.
+    #[error("{what} is missing: {needed}")]
+    Missing {
+        /// What is absent.
+        what: String,
+        /// Why it is needed and what to do.
+        needed: String,
+    },
+    /// The format, or its encoder, refuses what the result contains.
+    #[error("{format} cannot hold this result: {reason}")]
+    Unsupported {
+        /// Name of the format.
+        format: &'static str,
+        /// Why, with the values.
+        reason: String,
+    },
+    /// A file or folder could not be written.
+    #[error("cannot {action} {}: {source}", path.display())]
+    NotWritten {
+        /// What was tried.
+        action: &'static str,
+        /// On which path.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// A file of the name of an output.
+    #[error("{} exists: --overwrite replaces it, or choose another --out", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Another run writes to the folder.
+    #[error("{} is in use: another run writes to it; wait for its end, or choose another folder", folder.display())]
+    InUse {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// A file or folder could not be used.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
@@ -231,6 +319,40 @@ impl Error {
         Self::Input {
             path: path.to_owned(),
             reason: reason.into(),
+        }
+    }
+
+    /// What the system says of a file or folder that is written.
+    pub(crate) fn not_written(
+        action: &'static str,
+        path: &std::path::Path,
+        source: std::io::Error,
+    ) -> Self {
+        Self::NotWritten {
+            action,
+            path: path.to_owned(),
+            source,
+        }
+    }
+
+    /// A format, or its encoder, that refuses what the result contains.
+    pub(crate) fn unsupported(format: &'static str, reason: impl ToString) -> Self {
+        Self::Unsupported {
+            format,
+            reason: reason.to_string(),
+        }
+    }
+
+    /// A value outside what a format or a drawing can hold.
+    pub(crate) fn value(
+        field: impl Into<String>,
+        value: impl ToString,
+        allowed: impl Into<String>,
+    ) -> Self {
+        Self::Value {
+            field: field.into(),
+            value: value.to_string(),
+            allowed: allowed.into(),
         }
     }
 

@@ -97,7 +97,7 @@ impl Outputs {
     ) -> Result<(), Error> {
         match self.formats.csv {
             true => self.add(&format!("{stem}.csv"), of, |of, origin| {
-                Ok(make(of)?.to_csv(origin)?)
+                make(of)?.to_csv(origin)
             }),
             false => Ok(()),
         }
@@ -135,12 +135,12 @@ impl Outputs {
         let figure = of.filter(|_| svg || png).map(make).transpose()?;
         if svg {
             self.add(&format!("{stem}.svg"), figure.as_ref(), |figure, origin| {
-                Ok(figure.svg(origin)?)
+                figure.svg(origin)
             })?;
         }
         if png {
             self.add(&format!("{stem}.png"), figure.as_ref(), |figure, origin| {
-                Ok(figure.png(origin)?)
+                figure.png(origin)
             })?;
         }
         Ok(())
@@ -186,9 +186,9 @@ pub(crate) fn prepare(
     existing.check(folder, names.iter().map(String::as_str))?;
     in_folder(folder, false, || {
         drop(StagingFolder::make(folder)?);
-        Ok(alone
+        alone
             .then(|| FolderLock::take(folder))
             .transpose()
-            .map(drop)?)
+            .map(drop)
     })
 }

@@ -72,15 +72,15 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
     }
     if plan.runs(Stage::CrossPlane) {
         let plane = result.plane.as_ref();
-        files.table("flow", plane, |plane| Ok(tables::planes_table(plane)?))?;
+        files.table("flow", plane, tables::planes_table)?;
         files.netcdf("flow", plane, |plane, origin| {
-            Ok(crate::io::cf_planes::cf_planes_bytes(plane, origin)?)
+            crate::io::cf_planes::cf_planes_bytes(plane, origin)
         })?;
     }
     if plan.kept_realisations() > 0 {
         let signals = raw_signals(plan, result);
         files.netcdf("signals", signals.as_ref(), |signals, origin| {
-            Ok(crate::io::cf_signals::cf_signals_bytes(signals, origin)?)
+            crate::io::cf_signals::cf_signals_bytes(signals, origin)
         })?;
     }
     if plan.runs(Stage::Estimates) {
@@ -186,7 +186,7 @@ fn of_run(
 
 fn list_spectra(spectra: Option<Spectra>, files: &mut Outputs) -> Result<(), Error> {
     files.add("spectra.nc", spectra.as_ref(), |spectra, origin| {
-        Ok(crate::io::cf_spectra::cf_spectra_bytes(spectra, origin)?)
+        crate::io::cf_spectra::cf_spectra_bytes(spectra, origin)
     })
 }
 
@@ -194,7 +194,7 @@ fn list_spectra(spectra: Option<Spectra>, files: &mut Outputs) -> Result<(), Err
 fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Result<(), Error> {
     let schedule = &plan.geometry.schedule;
     let modes = schedule.modes();
-    files.table("map", map, |map| Ok(tables::map_table(map)?))?;
+    files.table("map", map, tables::map_table)?;
     for mode in &modes {
         // Readers take the kind of a CfRadial file from its first sweep: one for each kind.
         let (stem, own) = match modes.len() {
@@ -205,10 +205,10 @@ fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Resu
             ),
         };
         if modes.len() > 1 {
-            files.table(&stem, own.as_deref(), |map| Ok(tables::map_table(map)?))?;
+            files.table(&stem, own.as_deref(), tables::map_table)?;
         }
         files.netcdf(&stem, own.as_deref(), |map, origin| {
-            Ok(crate::io::cfradial::cfradial_bytes(map, origin)?)
+            crate::io::cfradial::cfradial_bytes(map, origin)
         })?;
     }
     let sweeps = map.map_or(schedule.sweeps.len(), |map| map.sweeps.len());
@@ -219,8 +219,8 @@ fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Resu
             format!("halo_{:04}", sweep + 1)
         };
         let name = format!("{stem}.hpl");
-        files.add(&name, map, |map, _| Ok(hpl::hpl_bytes(map, sweep, &name)?))?;
-        files.table(&stem, map, |map| Ok(hpl::hpl_table(map, sweep)?))?;
+        files.add(&name, map, |map, _| hpl::hpl_bytes(map, sweep, &name))?;
+        files.table(&stem, map, |map| hpl::hpl_table(map, sweep))?;
     }
     Ok(())
 }
@@ -247,7 +247,7 @@ pub fn write_set_up(plan: &Plan, path: &Path, existing: Existing) -> Result<(), 
         .unwrap_or(Path::new("."));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     existing.check(folder, [name.as_ref()])?;
-    Ok(crate::io::write_atomic(path, bytes)?)
+    crate::io::write_atomic(path, bytes)
 }
 
 /// Efficiency and SNR as a table.

@@ -8,7 +8,7 @@ use fixtures::pair::{CIRCULATION_M2_S, PairScan, truth};
 use rayon::prelude::*;
 use wakescope_estimate::retrieval::Side;
 use wakescope_estimate::vortex_fit::{
-    CorePrior, FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake,
+    CorePrior, FreeParameters, Parameter, Powers, ScanModel, Sharing, SignalFitOptions, Wake,
 };
 use wakescope_signal::NoiseModel;
 use wakescope_sim::retrieve::name;
@@ -142,7 +142,11 @@ fn fit_signals(trial: &FitTrial, start: Option<&Found>) -> [Option<Found>; 2] {
             core_radius,
             ..free()
         };
-        let fit = trial.signals(free, &guess, Starts::Several).ok()?;
+        let options = SignalFitOptions {
+            free,
+            ..Default::default()
+        };
+        let fit = trial.signals(&guess, &options).ok()?;
         Some((fit.wake, fit.covariance))
     })
 }

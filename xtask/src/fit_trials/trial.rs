@@ -6,7 +6,7 @@ use fixtures::pair::PairScan;
 use ndarray::Array2;
 use wakescope_estimate::vortex_fit::{
     CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, ScanSetup, SignalFit,
-    SignalFitOptions, Starts, VelocityMap, Wake, fit_map_of_estimator, fit_signals,
+    SignalFitOptions, VelocityMap, Wake, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
     Correlogram, Error, Refinement, SignalKind, SpectralPeak,
@@ -88,22 +88,16 @@ impl<'a> FitTrial<'a> {
     /// The fit of all signals from a guess on.
     pub(crate) fn signals(
         &self,
-        free: FreeParameters,
         guess: &Wake,
-        starts: Starts,
+        options: &SignalFitOptions,
     ) -> Result<SignalFit, Error> {
-        let options = SignalFitOptions {
-            free,
-            starts,
-            ..Default::default()
-        };
         fit_signals(
             &self.setup,
             |_, _| self.pair.snr,
             self.records.view(),
             self.pair.noise_power_a2(),
             guess,
-            &options,
+            options,
         )
     }
 }

@@ -26,7 +26,7 @@
 //! `cargo xtask reproduce-figs --profile standard --only 17` measures them again.
 //!
 //! The likelihood of one scan has several tops near the highest, since few lines cross a core and each has its speckle;
-//! which one is found depends on the start. So fits of signals begin with several core radii and heights ([`Starts`]), keep the
+//! which one is found depends on the start. So fits of signals begin with several core radii and heights ([`SignalFitOptions::several_starts`]), keep the
 //! highest top and report the others; `cargo xtask fit-trials` measures that against a start at the truth.
 //!
 //! To measure again: `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
@@ -49,7 +49,7 @@ pub use map_fit::secondary::SecondaryVortices;
 pub use signal_fit::baseband::Baseband;
 pub use signal_fit::fit::{SignalFit, fit_signals};
 pub use signal_fit::likelihood::{LikelihoodValue, Powers, ScanSignals};
-pub use signal_fit::options::{SignalFitOptions, Starts};
+pub use signal_fit::options::SignalFitOptions;
 pub use signal_fit::scan_model::{ScanModel, ScanSetup};
 pub use top::Top;
 pub use wake::core_prior::CorePrior;

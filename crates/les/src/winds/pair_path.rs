@@ -146,6 +146,10 @@ impl PairPath {
         })
     }
 
+    pub(super) fn transport(&self) -> &Transport {
+        &self.transport
+    }
+
     /// Stored times.
     pub(super) fn knots_tau(&self) -> impl Iterator<Item = f64> + '_ {
         self.knots.iter().map(|knot| knot.tau)

@@ -66,6 +66,11 @@ impl TransportedPair {
         Ok(found)
     }
 
+    /// How the pair decays and descends.
+    pub fn transport(&self) -> &Transport {
+        self.path.transport()
+    }
+
     /// The left and the right vortex at `time_s` since their release.
     ///
     /// # Errors

@@ -52,5 +52,5 @@ pub fn with(file: &SceneFile, key: &'static str, number: f64) -> Result<SceneFil
         key,
         reason: format!("a value other than {number}"),
     })?;
-    Ok(file.with(changed)?)
+    file.with(changed)
 }

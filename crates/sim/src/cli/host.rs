@@ -11,7 +11,7 @@ use crate::Error;
 use crate::flow::{CaseFile, WakePreset};
 use crate::io::raw::RawRecords;
 use crate::io::{Existing, Provenance, text_file, write_atomic};
-use crate::keys::{Problem, SceneError};
+use crate::keys::Problem;
 use crate::outputs::{self, Outputs};
 use crate::progress::{Observer, stoppable};
 use crate::scene::{Outputs as Formats, SceneFile};
@@ -54,18 +54,15 @@ pub type Refusal = Value;
 
 /// The refusal of a value of a scene that is not allowed.
 pub fn refusal_of_value(problem: Problem) -> Refusal {
-    as_object(
-        &SceneError::Invalid {
-            path: "scene".into(),
-            problems: vec![problem],
-        }
-        .into(),
-    )
+    as_object(&Error::Invalid {
+        path: "scene".into(),
+        problems: vec![problem],
+    })
 }
 
 /// The refusal of an error; without `lines` where nobody wrote the text that has them.
 pub fn refusal(mut error: Error, lines: bool) -> Refusal {
-    if let (Error::Scene(SceneError::Invalid { problems, .. }), false) = (&mut error, lines) {
+    if let (Error::Invalid { problems, .. }, false) = (&mut error, lines) {
         for problem in problems {
             problem.line = None;
         }
@@ -132,13 +129,13 @@ impl Cli {
     }
 
     /// The text of a scene or a case: what the program that called has for its path, else that of the file.
-    pub(super) fn text(&self, path: &Path) -> Result<Cow<'_, str>, SceneError> {
+    pub(super) fn text(&self, path: &Path) -> Result<Cow<'_, str>, Error> {
         if let Some(host) = &self.host
             && let Some(text) = host.texts.get(path)
         {
             return Ok(text.into());
         }
-        let text = text_file::read(path).map_err(|source| SceneError::Unreadable {
+        let text = text_file::read(path).map_err(|source| Error::Unreadable {
             path: path.to_owned(),
             source,
         })?;
@@ -170,7 +167,7 @@ impl Cli {
     /// The flow case of a path; keys that it lacks are those of the preset, if there is one.
     pub(super) fn case(&self, path: &Path, preset: Option<WakePreset>) -> Result<CaseFile, Error> {
         let text = self.text(path)?;
-        Ok(CaseFile::parse_over(preset, &text, path)?)
+        CaseFile::parse_over(preset, &text, path)
     }
 
     /// The signals of a path, if the calling program supplies them.
@@ -226,13 +223,13 @@ impl Cli {
             .file_name()
             .and_then(|name| name.to_str())
             .filter(|_| !self.keeps_files());
-        Ok(existing.check(path.parent().unwrap_or(Path::new("")), name)?)
+        existing.check(path.parent().unwrap_or(Path::new("")), name)
     }
 
     /// Writes a file, or keeps it.
     pub(super) fn write_file(&self, path: &Path, content: String) -> Result<(), Error> {
         if !self.keeps_files() {
-            return Ok(write_atomic(path, content)?);
+            return write_atomic(path, content);
         }
         self.answer()
             .files

@@ -1,7 +1,6 @@
 //! What the program prints: results to standard output, errors to standard error, as text or as JSON.
 
 use crate::Error;
-use crate::scene::SceneError;
 use clap::error::ContextKind;
 use serde_json::{Value, json};
 use std::io::{ErrorKind, Write as _};
@@ -87,7 +86,7 @@ pub(super) fn as_object(error: &Error) -> Value {
 
 fn problems(error: &Error) -> Vec<Value> {
     match error {
-        Error::Scene(SceneError::Invalid { path, problems }) => {
+        Error::Invalid { path, problems } => {
             let mut objects = Vec::with_capacity(problems.len());
             for problem in problems {
                 let mut object = problem_object(path, problem.line, &problem.allowed);
@@ -97,13 +96,13 @@ fn problems(error: &Error) -> Vec<Value> {
             }
             objects
         }
-        Error::Scene(SceneError::Malformed {
+        Error::Malformed {
             path,
             line,
             message,
-        }) => vec![problem_object(path, Some(*line), message)],
+        } => vec![problem_object(path, Some(*line), message)],
         Error::Input { path, reason } => vec![problem_object(path, None, reason)],
-        Error::Scene(SceneError::Unreadable { path, source }) | Error::Io { path, source, .. } => {
+        Error::Unreadable { path, source } | Error::Io { path, source, .. } => {
             vec![problem_object(path, None, &source.to_string())]
         }
         Error::Case { source, .. } | Error::Flight { source, .. } => problems(source),

@@ -185,7 +185,7 @@ fn list(found: Option<Found<'_>>, files: &mut Outputs) -> Result<(), Error> {
         },
     )?;
     files.netcdf("wind", found.as_ref(), |(profiles, _), origin| {
-        Ok(wind::netcdf(profiles, origin)?)
+        wind::netcdf(profiles, origin)
     })?;
     #[cfg(feature = "plots")]
     {

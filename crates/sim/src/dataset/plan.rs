@@ -10,9 +10,7 @@ use super::drawn::{DrawnKeys, Origin};
 use super::keys::PlanKeys;
 use crate::Error;
 use crate::io::{hash_of, text_file};
-use crate::keys::{
-    Checker, Declared as _, Format, Key, Problem, SceneError, Text, keys_of, near, to_table,
-};
+use crate::keys::{Checker, Declared as _, Format, Key, Problem, Text, keys_of, near, to_table};
 use crate::scene::SceneFile;
 use crate::streams::stream;
 use crate::sweep::{SceneKey, expression, number_of_key, set, text_of};
@@ -91,7 +89,7 @@ impl DatasetPlan {
         refuse_idle(&base, &mut c);
         let problems = c.into_problems();
         if !problems.is_empty() {
-            return Err(document.located(problems).into());
+            return Err(document.located(problems));
         }
         let folder = path.parent().unwrap_or(Path::new(""));
         let drawn = DrawnKeys::new(&site, &flight, keys.flight_rows.first(), folder)
@@ -198,7 +196,7 @@ impl DatasetPlan {
         // TOML has signed whole numbers.
         let seed = stream(self.keys.seed, "flight", number as u64).next_u64() >> 1;
         table.insert("seed".into(), Value::Integer(seed as i64));
-        Ok(SceneFile::parse(&text_of(&table), &self.path)?)
+        SceneFile::parse(&text_of(&table), &self.path)
     }
 
     /// The value of a key by its expression in the scene as it is so far.
@@ -216,7 +214,7 @@ impl DatasetPlan {
 
     /// An error of a drawn scene with the lines of the plan: its own text is that of no file.
     fn relocated(&self, mut error: Error) -> Error {
-        if let Error::Scene(SceneError::Invalid { problems, .. }) = &mut error
+        if let Error::Invalid { problems, .. } = &mut error
             && let Ok(document) = Text::parse(&self.text, &self.path)
         {
             for problem in problems {
@@ -383,20 +381,18 @@ fn part(whole: &mut Table, name: &str, c: &mut Checker<'_>) -> Table {
 }
 
 fn invalid(path: &Path, problems: Vec<Problem>) -> Error {
-    SceneError::Invalid {
+    Error::Invalid {
         path: path.to_owned(),
         problems,
     }
-    .into()
 }
 
 fn malformed(path: &Path, error: &toml::de::Error) -> Error {
-    SceneError::Malformed {
+    Error::Malformed {
         path: path.to_owned(),
         line: 1,
         message: error.message().into(),
     }
-    .into()
 }
 
 /// Problems of keys in quotation marks with their lines.

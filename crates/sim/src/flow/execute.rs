@@ -355,7 +355,7 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
         }
         _ => plain_schedule(
             case.output_times_s(end_s)
-                .map_err(|problem| Error::Scene(file.located(vec![problem])))?,
+                .map_err(|problem| file.located(vec![problem]))?,
         ),
     };
     let output_times_s: Vec<f64> = schedule.iter().map(|due| due.time_s).collect();
@@ -412,7 +412,7 @@ fn end_s(file: &CaseFile, setup: &Setup) -> Result<f64, Error> {
             Problem::ABSENT,
             "a number in s, e.g. 30.0, is required for a flow with kind = \"free\"",
         );
-        Error::Scene(file.located(vec![problem]))
+        file.located(vec![problem])
     })
 }
 

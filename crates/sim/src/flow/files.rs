@@ -170,7 +170,7 @@ impl Files {
     /// Refuses a folder that holds files of the names of this run, unless the run continues there or begins anew.
     pub(super) fn refuse_existing(&self, begin: Begin) -> Result<(), Error> {
         let existing = Existing::with_overwrite(begin != Begin::New);
-        Ok(existing.check(&self.folder, self.names().iter().map(String::as_str))?)
+        existing.check(&self.folder, self.names().iter().map(String::as_str))
     }
 
     /// Writes all files that are due, or none of them; returns their paths, on rank 0 alone. Of fields each rank writes what it
@@ -328,23 +328,16 @@ fn commit(group: &FileGroup, ranks: &Arc<dyn Ranks>) -> Result<Vec<PathBuf>, Err
     } else {
         Ok(None)
     };
-    let stage = agree(ranks, begun.map_err(Error::from))?;
+    let stage = agree(ranks, begun)?;
     let name = stage.as_ref().map_or_else(Vec::new, |stage| {
         stage.name().bytes().map(f64::from).collect()
     });
     let name = all_gather(&**ranks, name).map_err(Error::Flow)?;
     let name: Vec<u8> = name.into_iter().map(|byte| byte as u8).collect();
+    agree(ranks, group.write(&String::from_utf8_lossy(&name)))?;
     agree(
         ranks,
-        group
-            .write(&String::from_utf8_lossy(&name))
-            .map_err(Error::from),
-    )?;
-    agree(
-        ranks,
-        stage.map_or(Ok(Vec::new()), |stage| {
-            group.put(&stage).map_err(Error::from)
-        }),
+        stage.map_or(Ok(Vec::new()), |stage| group.put(&stage)),
     )
 }
 

@@ -43,14 +43,14 @@ pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakePr
 
 use crate::Error;
 use crate::document::{Content, Document};
-use crate::keys::{Problem, SceneError, to_table};
+use crate::keys::{Problem, to_table};
 use std::path::{Path, PathBuf};
 
 /// A valid case, with what names it.
 pub type CaseFile = Document<FlowCase>;
 
 impl Content for FlowCase {
-    fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
+    fn parse(text: &str, path: &Path) -> Result<Self, Error> {
         text::read(text, path, None)
     }
 
@@ -80,11 +80,7 @@ impl CaseFile {
     ///
     /// # Errors
     /// As [`CaseFile::parse`].
-    pub fn parse_over(
-        preset: Option<WakePreset>,
-        text: &str,
-        path: &Path,
-    ) -> Result<Self, SceneError> {
+    pub fn parse_over(preset: Option<WakePreset>, text: &str, path: &Path) -> Result<Self, Error> {
         let base = preset.map(WakePreset::case);
         Ok(Self::of(text::read(text, path, base.as_ref())?, path, text))
     }
@@ -93,7 +89,7 @@ impl CaseFile {
     ///
     /// # Errors
     /// An end that is no finite number above 0.
-    pub fn with_end(&self, end: f64) -> Result<Self, SceneError> {
+    pub fn with_end(&self, end: f64) -> Result<Self, Error> {
         let mut case = self.content.clone();
         case.time.end_s = None;
         match &mut case.wake {
@@ -124,7 +120,7 @@ impl CaseFile {
     ///
     /// # Errors
     /// A flow whose noise has no seed.
-    pub fn with_seed(&self, seed: u64) -> Result<Self, SceneError> {
+    pub fn with_seed(&self, seed: u64) -> Result<Self, Error> {
         let mut case = self.content.clone();
         let CaseKind::Wake(wake) = &mut case.case else {
             let allowed = "absent: this flow has no noise; it is for case.kind = \"wake\"";
@@ -135,7 +131,7 @@ impl CaseFile {
     }
 
     fn refuse(&self, key: &str, value: impl std::fmt::Debug, allowed: String) -> Error {
-        Error::Scene(self.located(vec![Problem::new(key, format!("{value:?}"), allowed)]))
+        self.located(vec![Problem::new(key, format!("{value:?}"), allowed)])
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::case::FlowCase;
 use super::kind::CaseKind;
-use crate::keys::{Format, Key, SceneError, Text, from_table, keys_of, to_table};
+use crate::Error;
+use crate::keys::{Format, Key, Text, from_table, keys_of, to_table};
 use std::path::Path;
 use std::sync::LazyLock;
 use toml::Table;
@@ -32,11 +33,7 @@ const TAGS: [&str; 3] = ["kind", "from", "model"];
 ///
 /// # Errors
 /// The file, the line, the key, the value and what is allowed.
-pub(super) fn read(
-    text: &str,
-    path: &Path,
-    base: Option<&FlowCase>,
-) -> Result<FlowCase, SceneError> {
+pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<FlowCase, Error> {
     static KEYS: LazyLock<Vec<Key>> = LazyLock::new(|| {
         let mut keys = keys_of::<FlowCase>();
         // Which flow is no matter of defaults.

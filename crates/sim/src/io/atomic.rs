@@ -3,8 +3,8 @@
 //! if a rename fails, the earlier ones are undone and replaced files come back.
 //! Check: the tests provoke a failure at each step and list the folder afterwards.
 
-use super::error::{OutputError, OutputResult};
 use super::parts::FileParts;
+use crate::Error;
 use std::fs;
 use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// let written = group.commit()?;
 /// assert_eq!(std::fs::read_to_string(&written[0]).unwrap(), "range_m\n100.0\n");
 /// # std::fs::remove_dir_all(&folder).ok();
-/// # Ok::<(), wakescope_sim::io::OutputError>(())
+/// # Ok::<(), wakescope_sim::Error>(())
 /// ```
 #[derive(Debug)]
 pub struct FileGroup {
@@ -40,7 +40,7 @@ impl FileGroup {
     ///
     /// # Errors
     /// A name that is not a plain file name (empty, with a separator, `.`, `..`), or one already in the group.
-    pub fn add(&mut self, name: &str, content: impl Into<Vec<u8>>) -> OutputResult<()> {
+    pub fn add(&mut self, name: &str, content: impl Into<Vec<u8>>) -> Result<(), Error> {
         self.add_parts(name, FileParts::from(content.into()))
     }
 
@@ -48,16 +48,16 @@ impl FileGroup {
     ///
     /// # Errors
     /// As [`Self::add`].
-    pub fn add_parts(&mut self, name: &str, content: FileParts) -> OutputResult<()> {
+    pub fn add_parts(&mut self, name: &str, content: FileParts) -> Result<(), Error> {
         if Path::new(name).file_name() != Some(name.as_ref()) {
-            return Err(OutputError::value(
+            return Err(Error::value(
                 "file name",
                 name,
                 "must be a plain name without folders",
             ));
         }
         if self.files.iter().any(|(n, _)| n == name) {
-            return Err(OutputError::Duplicate {
+            return Err(Error::Duplicate {
                 what: "file",
                 name: name.into(),
             });
@@ -70,11 +70,11 @@ impl FileGroup {
     ///
     /// # Errors
     /// The first refusal of the system. The folder is then as it was before, and a folder made by this call is gone again.
-    pub fn commit(self) -> OutputResult<Vec<PathBuf>> {
+    pub fn commit(self) -> Result<Vec<PathBuf>, Error> {
         in_folder(&self.folder, true, || self.commit_inside())
     }
 
-    fn commit_inside(&self) -> OutputResult<Vec<PathBuf>> {
+    fn commit_inside(&self) -> Result<Vec<PathBuf>, Error> {
         let staging = self.begin()?;
         self.write(&staging.name())?;
         self.put(&staging)
@@ -84,12 +84,12 @@ impl FileGroup {
     ///
     /// # Errors
     /// The first refusal of the system.
-    pub(crate) fn begin(&self) -> OutputResult<StagingFolder> {
+    pub(crate) fn begin(&self) -> Result<StagingFolder, Error> {
         let staging = StagingFolder::make(&self.folder)?;
         for (name, content) in &self.files {
             let path = staging.new.join(name);
             let made = fs::File::create_new(&path).and_then(|file| file.set_len(content.length));
-            made.map_err(|e| OutputError::io("write", &path, e))?;
+            made.map_err(|e| Error::not_written("write", &path, e))?;
         }
         Ok(staging)
     }
@@ -98,13 +98,13 @@ impl FileGroup {
     ///
     /// # Errors
     /// The first refusal of the system.
-    pub(crate) fn write(&self, staging: &str) -> OutputResult<()> {
+    pub(crate) fn write(&self, staging: &str) -> Result<(), Error> {
         for (name, content) in &self.files {
             if content.parts.is_empty() {
                 continue;
             }
             let path = self.folder.join(staging).join(NEW).join(name);
-            write_parts(&path, content).map_err(|e| OutputError::io("write", &path, e))?;
+            write_parts(&path, content).map_err(|e| Error::not_written("write", &path, e))?;
         }
         Ok(())
     }
@@ -113,7 +113,7 @@ impl FileGroup {
     ///
     /// # Errors
     /// The first refusal of the system. The folder is then as it was before.
-    pub(crate) fn put(&self, staging: &StagingFolder) -> OutputResult<Vec<PathBuf>> {
+    pub(crate) fn put(&self, staging: &StagingFolder) -> Result<Vec<PathBuf>, Error> {
         for (place, (name, _)) in self.files.iter().enumerate() {
             // After the last one nothing can fail, so that what it replaces need not be kept: in one step, for others may do the same.
             if let Err(error) = self.put_one(staging, name, place + 1 == self.files.len()) {
@@ -140,7 +140,7 @@ impl FileGroup {
     }
 
     /// Puts one file into place; an older one stays in the staging folder, except for the last file.
-    fn put_one(&self, staging: &StagingFolder, name: &str, is_last: bool) -> OutputResult<()> {
+    fn put_one(&self, staging: &StagingFolder, name: &str, is_last: bool) -> Result<(), Error> {
         let target = self.folder.join(name);
         let kept = staging.old.join(name);
         if target.is_dir() {
@@ -148,17 +148,17 @@ impl FileGroup {
                 ErrorKind::IsADirectory,
                 "a folder of that name is in the way",
             );
-            return Err(OutputError::io("write", &target, source));
+            return Err(Error::not_written("write", &target, source));
         }
         let keeps = !is_last && target.symlink_metadata().is_ok();
         if keeps {
-            fs::rename(&target, &kept).map_err(|e| OutputError::io("replace", &target, e))?;
+            fs::rename(&target, &kept).map_err(|e| Error::not_written("replace", &target, e))?;
         }
         fs::rename(staging.new.join(name), &target).map_err(|source| {
             if keeps {
                 drop(fs::rename(&kept, &target));
             }
-            OutputError::io("write", &target, source)
+            Error::not_written("write", &target, source)
         })
     }
 }
@@ -167,9 +167,9 @@ impl FileGroup {
 ///
 /// # Errors
 /// The refusal of the system; nothing is left behind and an older file is untouched.
-pub fn write_atomic(path: &Path, content: impl Into<Vec<u8>>) -> OutputResult<()> {
+pub fn write_atomic(path: &Path, content: impl Into<Vec<u8>>) -> Result<(), Error> {
     let name = path.file_name().and_then(|n| n.to_str()).ok_or_else(|| {
-        OutputError::value(
+        Error::value(
             "file name",
             path.display(),
             "must end with a UTF-8 file name",
@@ -294,7 +294,7 @@ impl StagingFolder {
         unique: usize,
         target: &Path,
         content: &[u8],
-    ) -> OutputResult<()> {
+    ) -> Result<(), Error> {
         let staged = self.new.join(unique.to_string());
         let written = fs::write(&staged, content)
             .and_then(|()| fs::File::open(&staged))
@@ -306,7 +306,7 @@ impl StagingFolder {
             .and_then(|()| fs::rename(&staged, target));
         written.map_err(|error| {
             drop(fs::remove_file(&staged));
-            OutputError::io("write", target, error)
+            Error::not_written("write", target, error)
         })
     }
 
@@ -314,22 +314,22 @@ impl StagingFolder {
     ///
     /// # Errors
     /// Files cannot be written there.
-    pub(crate) fn make(folder: &Path) -> OutputResult<Self> {
+    pub(crate) fn make(folder: &Path) -> Result<Self, Error> {
         for attempt in 0..10_000 {
             let root = folder.join(format!("{STAGE}{}-{attempt}", std::process::id()));
             match fs::create_dir(&root) {
                 Ok(()) => {}
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => continue,
-                Err(e) => return Err(OutputError::io("write into", folder, e)),
+                Err(e) => return Err(Error::not_written("write into", folder, e)),
             }
             match Self::begin(&root) {
                 Ok(staging) => return Ok(staging),
                 // Before it was locked somebody took it for one that was left.
                 Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::WouldBlock) => {}
-                Err(e) => return Err(OutputError::io("create folder", &root, e)),
+                Err(e) => return Err(Error::not_written("create folder", &root, e)),
             }
         }
-        Err(OutputError::io(
+        Err(Error::not_written(
             "write into",
             folder,
             ErrorKind::AlreadyExists.into(),
@@ -364,14 +364,14 @@ impl Drop for StagingFolder {
 ///
 /// # Errors
 /// The folder cannot be made; what fails in it.
-pub(crate) fn in_folder<T, E: From<OutputError>>(
+pub(crate) fn in_folder<T>(
     folder: &Path,
     stays: bool,
-    inside: impl FnOnce() -> Result<T, E>,
-) -> Result<T, E> {
+    inside: impl FnOnce() -> Result<T, Error>,
+) -> Result<T, Error> {
     let missing = missing_ancestors(folder);
     let made =
-        fs::create_dir_all(folder).map_err(|e| OutputError::io("create folder", folder, e).into());
+        fs::create_dir_all(folder).map_err(|e| Error::not_written("create folder", folder, e));
     let done = made.and_then(|()| inside());
     if done.is_err() || !stays {
         // Deepest first; `remove_dir` leaves a folder that another program has used meanwhile.
@@ -452,7 +452,7 @@ mod tests {
         for folder in [file.clone(), file.join("sub/folder")] {
             assert!(matches!(
                 group(&folder, &["a"]).commit(),
-                Err(OutputError::Io { .. })
+                Err(Error::NotWritten { .. })
             ));
         }
         assert_eq!(listing(temp.path()), ["file"]);
@@ -471,7 +471,7 @@ mod tests {
         let result = group(&folder, &["a"]).commit();
         fs::set_permissions(&folder, fs::Permissions::from_mode(0o755)).unwrap();
         if !privileged {
-            assert!(matches!(result, Err(OutputError::Io { .. })));
+            assert!(matches!(result, Err(Error::NotWritten { .. })));
             assert!(listing(&folder).is_empty());
         }
     }
@@ -520,9 +520,6 @@ mod tests {
             assert!(group.add(name, "").is_err(), "{name:?}");
         }
         group.add("a", "").unwrap();
-        assert!(matches!(
-            group.add("a", ""),
-            Err(OutputError::Duplicate { .. })
-        ));
+        assert!(matches!(group.add("a", ""), Err(Error::Duplicate { .. })));
     }
 }

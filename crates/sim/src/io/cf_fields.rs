@@ -2,12 +2,13 @@
 //! full precision, from which a run can start. One file for each time: `xarray.concat` or `open_mfdataset` joins them.
 //! Check: the tests read the bytes back and compare axes and values.
 
+use super::checks::same_length;
 use super::edges;
-use super::error::{OutputResult, same_length};
 use super::fields::VelocityField;
 use super::netcdf::{Data, Layout, Variable, described};
 use super::parts::FileParts;
 use super::provenance::Provenance;
+use crate::Error;
 use std::ops::Range;
 use wakescope_les::winds::Edges;
 
@@ -15,7 +16,7 @@ use wakescope_les::winds::Edges;
 ///
 /// # Errors
 /// What [`VelocityField::check`] finds, or a result too large for one file.
-pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputResult<FileParts> {
+pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> Result<FileParts, Error> {
     field.check()?;
     let [u, v, w] = &field.velocity_m_s;
     let mut values = vec![
@@ -73,7 +74,7 @@ pub struct FaceVelocities {
 ///
 /// # Errors
 /// An array of another length than its axes, or a result too large for one file.
-pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> OutputResult<FileParts> {
+pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> Result<FileParts, Error> {
     let mut dims = Vec::new();
     let mut values = vec![("time", Data::f64([faces.time_s]))];
     for (d, (name, face)) in [("x", "x_face"), ("y", "y_face"), ("z", "z_face")]

@@ -3,16 +3,16 @@
 //! Check: the tests read the bytes back and compare axes, values and the missing one.
 
 use super::edges;
-use super::error::OutputResult;
 use super::map::CrossPlanes;
 use super::netcdf::{Data, Layout, described};
 use super::provenance::Provenance;
+use crate::Error;
 
 /// The file's bytes.
 ///
 /// # Errors
 /// What [`CrossPlanes::check`] finds, or a result too large for one file.
-pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> Result<Vec<u8>, Error> {
     planes.check()?;
     let values = [
         ("tau", Data::f64_slice(&planes.tau)),

@@ -2,10 +2,10 @@
 //! must know of the recording, and the true velocities that its results are to be held against.
 //! Check: the tests read the bytes back and compare values, axes and units.
 
-use super::error::OutputResult;
 use super::netcdf::{Data, Layout, described};
 use super::provenance::Provenance;
 use super::signals::RawSignals;
+use crate::Error;
 
 /// The file's bytes.
 ///
@@ -14,7 +14,7 @@ use super::signals::RawSignals;
 pub fn cf_signals_bytes(
     signals: &RawSignals<'_>,
     provenance: &Provenance,
-) -> OutputResult<Vec<u8>> {
+) -> Result<Vec<u8>, Error> {
     signals.check()?;
     let (records, samples) = signals.current_a.dim();
     let mut line_elevation_rad = Vec::new();

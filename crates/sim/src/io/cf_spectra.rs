@@ -1,9 +1,9 @@
 //! Spectra of gates as CF NetCDF (classic): density over (line, range, velocity).
 //! Check: a test of the program reads the file back.
 
-use super::error::OutputResult;
 use super::netcdf::{Data, Layout, described};
 use super::provenance::Provenance;
+use crate::Error;
 
 /// Spectra \[line, gate, velocity\] of all scans.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +24,7 @@ pub struct Spectra {
 ///
 /// # Errors
 /// A result too large for one file.
-pub fn cf_spectra_bytes(spectra: &Spectra, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn cf_spectra_bytes(spectra: &Spectra, provenance: &Provenance) -> Result<Vec<u8>, Error> {
     let values = [
         ("velocity", Data::f64_slice(&spectra.velocity_m_s)),
         ("range", Data::f64_slice(&spectra.range_m)),

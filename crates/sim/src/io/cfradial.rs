@@ -3,11 +3,11 @@
 //! Ray times count from the start of the flow, whose date is that of the map's site: a synthetic one where none was given.
 //! Check: the tests read the bytes back with an independent reader and hold them to the list that the clients need.
 
-use super::error::{OutputError, OutputResult};
 use super::map::{Field, Ray, Unit, VelocityMap};
 use super::netcdf::{Data, FILL, Layout, Variable, described};
 use super::provenance::Provenance;
 use super::utc::MAX_TIME_S;
+use crate::Error;
 use crate::beams::SweepMode;
 use std::f64::consts::FRAC_PI_2;
 
@@ -20,7 +20,7 @@ const TEXT: usize = 32;
 ///
 /// # Errors
 /// What [`VelocityMap::check`] finds, ray times beyond 1e9 s, no velocity at all, a result too large for one file.
-pub fn cfradial_bytes(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn cfradial_bytes(map: &VelocityMap, provenance: &Provenance) -> Result<Vec<u8>, Error> {
     layout(map, provenance)?.into_bytes(provenance)
 }
 
@@ -29,16 +29,12 @@ pub(crate) fn data_bytes(rays: f64, gates: f64) -> f64 {
     64.0 * rays * gates + 64.0 * rays + 4.0 * gates + 4096.0
 }
 
-fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
+fn layout(map: &VelocityMap, provenance: &Provenance) -> Result<Layout, Error> {
     map.check()?;
     let times: Vec<f64> = map.rays.iter().map(|r| r.time_s).collect();
     if let Some(bad) = times.iter().find(|t| t.abs() > MAX_TIME_S) {
         let allowed = format!("within {MAX_TIME_S:?} s of the start of the flow");
-        return Err(OutputError::value(
-            "ray time_s",
-            format!("{bad:?}"),
-            allowed,
-        ));
+        return Err(Error::value("ray time_s", format!("{bad:?}"), allowed));
     }
     let mut values = axes(map, times);
     values.extend(site(map));
@@ -336,7 +332,7 @@ fn instrument(map: &VelocityMap) -> Values {
 
 /// The estimates keep the scene too: xradar writes no global attributes but its own, and what a map means for a wake is in the scene; and
 /// the part of it that says how they were estimated, for those who drop it.
-fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
+fn fields(map: &VelocityMap, scene_toml: &str) -> Result<Vec<Variable>, Error> {
     let mut out = Vec::with_capacity(map.fields.len() + 1);
     for field in &map.fields {
         let variable = field_variable(field);
@@ -351,7 +347,7 @@ fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
         let source = ["v_gate", "v_pulse", "v_exact"]
             .iter()
             .find_map(|name| map.field(name));
-        let source = source.ok_or_else(|| OutputError::Missing {
+        let source = source.ok_or_else(|| Error::Missing {
             what: "field radial_velocity".into(),
             needed: "a CfRadial file needs it, or one of v_gate, v_pulse, v_exact in its place"
                 .into(),

@@ -3,6 +3,7 @@
 use super::super::provenance::example;
 use super::super::samples;
 use super::*;
+use crate::Error;
 use crate::io::Site;
 use netcdf3::FileReader;
 
@@ -163,7 +164,7 @@ fn a_map_without_estimate_shows_the_gate_velocity() {
     map.fields.clear();
     assert!(matches!(
         cfradial_bytes(&map, &example()),
-        Err(OutputError::Missing { .. })
+        Err(Error::Missing { .. })
     ));
 }
 
@@ -214,7 +215,7 @@ fn a_time_beyond_every_calendar_is_refused() {
     map.rays[0].time_s = -2e9;
     assert!(matches!(
         cfradial_bytes(&map, &example()),
-        Err(OutputError::Value { .. })
+        Err(Error::Value { .. })
     ));
 }
 

@@ -2,8 +2,9 @@
 //! Floats are the shortest text that reads back to the same bits, a missing value is an empty cell.
 //! Check: the tests parse the text again and compare bit patterns.
 
-use super::error::{OutputError, OutputResult, same_length};
+use super::checks::same_length;
 use super::provenance::Provenance;
+use crate::Error;
 
 /// A usual float with its separator.
 const USUAL_CELL_BYTES: usize = 20;
@@ -58,7 +59,7 @@ impl Column {
 ///     .float("snr_db", [12.5, f64::NAN])
 ///     .to_csv(&origin)?;
 /// assert!(text.ends_with("range_m,snr_db\n100.0,12.5\n200.0,\n"));
-/// # Ok::<(), wakescope_sim::io::OutputError>(())
+/// # Ok::<(), wakescope_sim::Error>(())
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
@@ -110,7 +111,7 @@ impl Table {
     ///
     /// # Errors
     /// Tables whose columns differ in number, name or kind.
-    pub fn stack(tables: impl IntoIterator<Item = Self>) -> OutputResult<Self> {
+    pub fn stack(tables: impl IntoIterator<Item = Self>) -> Result<Self, Error> {
         let mut tables = tables.into_iter();
         let mut all = tables.next().unwrap_or_default();
         for table in tables {
@@ -120,7 +121,7 @@ impl Table {
     }
 
     /// Adds the rows of a table with the same columns.
-    fn append(&mut self, table: Self) -> OutputResult<()> {
+    fn append(&mut self, table: Self) -> Result<(), Error> {
         let has_same_count = self.columns.len() == table.columns.len();
         for ((name, column), (other, more)) in self.columns.iter_mut().zip(table.columns) {
             let is_same = has_same_count && *name == other;
@@ -129,7 +130,7 @@ impl Table {
                 (Column::Int(column), Column::Int(more)) if is_same => column.extend(more),
                 (Column::Text(column), Column::Text(more)) if is_same => column.extend(more),
                 _ => {
-                    return Err(OutputError::value(
+                    return Err(Error::value(
                         "column of a table",
                         other,
                         format!("{name}, of the same kind"),
@@ -192,7 +193,7 @@ impl Table {
     ///
     /// # Errors
     /// No column, columns of different lengths, a repeated or empty name, a name that would look like a comment.
-    pub fn to_csv(&self, provenance: &Provenance) -> OutputResult<String> {
+    pub fn to_csv(&self, provenance: &Provenance) -> Result<String, Error> {
         self.check()?;
         let header: Vec<String> = self
             .columns
@@ -215,9 +216,9 @@ impl Table {
         Ok(out)
     }
 
-    fn check(&self) -> OutputResult<()> {
+    fn check(&self) -> Result<(), Error> {
         let Some((first, values)) = self.columns.first() else {
-            return Err(OutputError::Missing {
+            return Err(Error::Missing {
                 what: "column".into(),
                 needed: "a table has at least one".into(),
             });
@@ -225,14 +226,14 @@ impl Table {
         for (i, (name, column)) in self.columns.iter().enumerate() {
             same_length(name, column.len(), first, values.len())?;
             if name.is_empty() || name.starts_with('#') {
-                return Err(OutputError::value(
+                return Err(Error::value(
                     "column name",
                     name,
                     "must not be empty or start with '#'",
                 ));
             }
             if self.columns[..i].iter().any(|(n, _)| n == name) {
-                return Err(OutputError::Duplicate {
+                return Err(Error::Duplicate {
                     what: "column",
                     name: name.clone(),
                 });
@@ -358,21 +359,21 @@ mod tests {
         let uneven = Table::new().float("a", [1.0]).float("b", [1.0, 2.0]);
         assert!(matches!(
             uneven.to_csv(&example()),
-            Err(OutputError::Length { .. })
+            Err(Error::Length { .. })
         ));
         let twice = Table::new().float("a", [1.0]).float("a", [1.0]);
         assert!(matches!(
             twice.to_csv(&example()),
-            Err(OutputError::Duplicate { .. })
+            Err(Error::Duplicate { .. })
         ));
         assert!(matches!(
             Table::new().to_csv(&example()),
-            Err(OutputError::Missing { .. })
+            Err(Error::Missing { .. })
         ));
         let comment = Table::new().float("#a", [1.0]);
         assert!(matches!(
             comment.to_csv(&example()),
-            Err(OutputError::Value { .. })
+            Err(Error::Value { .. })
         ));
     }
 }

@@ -1,7 +1,7 @@
 //! Files that exist where a command is to write: refused, or replaced where the user requests it.
 //! Check: an existing file, a link and a folder of the name of an output.
 
-use super::error::{OutputError, OutputResult};
+use crate::Error;
 use std::path::Path;
 
 /// What becomes of a file that has the name of an output.
@@ -27,12 +27,12 @@ impl Existing {
     /// Refuses names in a folder that cannot be written: an existing file, unless it is to be replaced, or a folder.
     ///
     /// # Errors
-    /// [`OutputError::Exists`] or [`OutputError::Io`], with the path.
+    /// [`Error::Exists`] or [`Error::NotWritten`], with the path.
     pub fn check<'a>(
         self,
         folder: &Path,
         names: impl IntoIterator<Item = &'a str>,
-    ) -> OutputResult<()> {
+    ) -> Result<(), Error> {
         for name in names {
             let path = folder.join(name);
             if path.symlink_metadata().is_err() {
@@ -43,10 +43,10 @@ impl Existing {
                     std::io::ErrorKind::IsADirectory,
                     "a folder of that name is in the way",
                 );
-                return Err(OutputError::io("write", &path, source));
+                return Err(Error::not_written("write", &path, source));
             }
             if self == Self::Refuse {
-                return Err(OutputError::Exists { path });
+                return Err(Error::Exists { path });
             }
         }
         Ok(())

@@ -1,7 +1,8 @@
 //! A whole velocity field at one time, at the centres of a stretched mesh.
 //! Check: wrong lengths and values are refused; the formats' tests read fields back.
 
-use super::error::{OutputError, OutputResult, increasing, same_length};
+use super::checks::{increasing, same_length};
+use crate::Error;
 use std::ops::Range;
 
 /// Velocity and pressure at the centres of the cells.
@@ -34,7 +35,7 @@ impl VelocityField {
     ///
     /// # Errors
     /// An axis that is empty or does not increase, an array of another length, a value that is not finite.
-    pub fn check(&self) -> OutputResult<()> {
+    pub fn check(&self) -> Result<(), Error> {
         increasing("x_m", &self.x_m)?;
         increasing("y_m", &self.y_m)?;
         increasing("z_m", &self.z_m)?;
@@ -42,7 +43,7 @@ impl VelocityField {
         for (name, values) in self.named() {
             same_length(name, values.len(), "z_m x y_m x x_m", cells)?;
             if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
-                return Err(OutputError::value(name, bad, "must be finite"));
+                return Err(Error::value(name, bad, "must be finite"));
             }
         }
         Ok(())
@@ -115,9 +116,9 @@ mod tests {
     fn wrong_lengths_and_values_are_refused() {
         let mut short = example();
         short.velocity_m_s[1].pop();
-        assert!(matches!(short.check(), Err(OutputError::Length { .. })));
+        assert!(matches!(short.check(), Err(Error::Length { .. })));
         let mut bad = example();
         bad.pressure_m2_s2[3] = f64::NAN;
-        assert!(matches!(bad.check(), Err(OutputError::Value { .. })));
+        assert!(matches!(bad.check(), Err(Error::Value { .. })));
     }
 }

@@ -4,9 +4,9 @@
 //! signal-to-noise ratio has intensity 1. Check: the tests read the text back line by line.
 
 use super::csv::Table;
-use super::error::{OutputError, OutputResult};
 use super::map::VelocityMap;
 use super::utc::DAY_S;
+use crate::Error;
 use crate::SPEED_OF_LIGHT_M_S;
 use crate::beams::SweepMode;
 use ndarray::Array2;
@@ -26,7 +26,7 @@ const FORMAT: &str = "HALO .hpl";
 /// What [`VelocityMap::check`] finds; no such sweep; no field `radial_velocity` or `signal_to_noise_ratio`; gates
 /// that overlap or leave gaps, or do not start a whole number of gates from the lidar (the format derives the range
 /// from the gate number); a sweep across midnight UTC.
-pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResult<Vec<u8>> {
+pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> Result<Vec<u8>, Error> {
     let (first, last) = sweep_rays(map, sweep)?;
     let velocity = values(map, "radial_velocity")?;
     let snr_db = values(map, "signal_to_noise_ratio")?;
@@ -66,7 +66,7 @@ pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResu
 ///
 /// # Errors
 /// As [`hpl_bytes`].
-pub fn hpl_table(map: &VelocityMap, sweep: usize) -> OutputResult<Table> {
+pub fn hpl_table(map: &VelocityMap, sweep: usize) -> Result<Table, Error> {
     let (first, last) = sweep_rays(map, sweep)?;
     let velocity = values(map, "radial_velocity")?;
     let snr_db = values(map, "signal_to_noise_ratio")?;
@@ -104,16 +104,16 @@ pub fn hpl_table(map: &VelocityMap, sweep: usize) -> OutputResult<Table> {
 }
 
 /// First and last ray of a sweep of a valid map.
-fn sweep_rays(map: &VelocityMap, sweep: usize) -> OutputResult<(usize, usize)> {
+fn sweep_rays(map: &VelocityMap, sweep: usize) -> Result<(usize, usize), Error> {
     map.check()?;
     let bounds = map.sweep_bounds();
     let rays = bounds.get(sweep).copied();
-    rays.ok_or_else(|| OutputError::value("sweep", sweep, format!("below {}", bounds.len())))
+    rays.ok_or_else(|| Error::value("sweep", sweep, format!("below {}", bounds.len())))
 }
 
 /// Values of a field that the format needs.
-fn values<'m>(map: &'m VelocityMap, name: &str) -> OutputResult<&'m Array2<f64>> {
-    let field = map.field(name).ok_or_else(|| OutputError::Missing {
+fn values<'m>(map: &'m VelocityMap, name: &str) -> Result<&'m Array2<f64>, Error> {
+    let field = map.field(name).ok_or_else(|| Error::Missing {
         what: format!("field {name}"),
         needed: "an .hpl file holds velocity and intensity".into(),
     })?;
@@ -124,14 +124,14 @@ fn values<'m>(map: &'m VelocityMap, name: &str) -> OutputResult<&'m Array2<f64>>
 ///
 /// # Errors
 /// A sweep that begins on one day and ends on the next, with both times.
-pub fn within_a_day(first_s: f64, last_s: f64, start: super::UtcTime) -> OutputResult<()> {
+pub fn within_a_day(first_s: f64, last_s: f64, start: super::UtcTime) -> Result<(), Error> {
     let first = start.after_s(first_s);
     let last = start.after_s(last_s);
     if first.date() == last.date() {
         return Ok(());
     }
     let both = format!("{first} to {last}");
-    Err(OutputError::value(
+    Err(Error::value(
         "time of the rays",
         both,
         "an .hpl file holds a sweep within one day",
@@ -139,9 +139,9 @@ pub fn within_a_day(first_s: f64, last_s: f64, start: super::UtcTime) -> OutputR
 }
 
 /// Gate length in metres, and number of gates between the lidar and the first one.
-fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
+fn gate_grid(range_m: &[f64]) -> Result<(f64, usize), Error> {
     if range_m.len() < 2 {
-        return Err(OutputError::unsupported(
+        return Err(Error::unsupported(
             FORMAT,
             "a map of one gate has no gate length",
         ));
@@ -152,7 +152,7 @@ fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
         // Readers compute the centre as (gate + 0.5) * length; a millimetre is below what they keep.
         let expected = (before + i as f64 + 0.5) * gate_m;
         if before < 0.0 || (expected - r).abs() > 1e-3 {
-            return Err(OutputError::unsupported(
+            return Err(Error::unsupported(
                 FORMAT,
                 format!(
                     "gate {i} is at {r} m; the format puts it at {expected} m: gates must touch, and start a whole number of gates from \
@@ -325,11 +325,11 @@ mod tests {
         map.range_m.iter_mut().for_each(|r| *r += 7.0);
         assert!(matches!(
             hpl_bytes(&map, 0, "x.hpl"),
-            Err(OutputError::Unsupported { .. })
+            Err(Error::Unsupported { .. })
         ));
         assert!(matches!(
             hpl_bytes(&samples::map(), 2, "x.hpl"),
-            Err(OutputError::Value { .. })
+            Err(Error::Value { .. })
         ));
     }
 

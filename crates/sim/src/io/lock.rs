@@ -6,7 +6,7 @@
 //! Check: a second lock is refused, a lock that was given back can be taken, nothing stays behind.
 
 use super::atomic::sweep_stages;
-use super::error::{OutputError, OutputResult};
+use crate::Error;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -24,8 +24,8 @@ impl FolderLock {
     /// Takes the lock of a folder, which must exist.
     ///
     /// # Errors
-    /// [`OutputError::InUse`] while another run has it; what the system says.
-    pub(crate) fn take(folder: &Path) -> OutputResult<Self> {
+    /// [`Error::InUse`] while another run has it; what the system says.
+    pub(crate) fn take(folder: &Path) -> Result<Self, Error> {
         let path = folder.join(NAME);
         let file = loop {
             let opened = OpenOptions::new()
@@ -33,11 +33,11 @@ impl FolderLock {
                 .truncate(false)
                 .write(true)
                 .open(&path);
-            let file = opened.map_err(|error| OutputError::io("lock", &path, error))?;
+            let file = opened.map_err(|error| Error::not_written("lock", &path, error))?;
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
-                    return Err(OutputError::InUse {
+                    return Err(Error::InUse {
                         folder: folder.to_owned(),
                     });
                 }
@@ -48,7 +48,7 @@ impl FolderLock {
                     break file;
                 }
                 Err(TryLockError::Error(error)) => {
-                    return Err(OutputError::io("lock", &path, error));
+                    return Err(Error::not_written("lock", &path, error));
                 }
             }
             if is_at(&file, &path) {
@@ -101,7 +101,7 @@ mod tests {
         let temp = tempfile::tempdir().unwrap();
         let first = FolderLock::take(temp.path()).unwrap();
         let second = FolderLock::take(temp.path()).unwrap_err();
-        assert!(matches!(second, OutputError::InUse { .. }), "{second}");
+        assert!(matches!(second, Error::InUse { .. }), "{second}");
         assert!(
             second.to_string().contains(temp.path().to_str().unwrap()),
             "{second}"

@@ -2,9 +2,10 @@
 //! Plain data; the writers call [`VelocityMap::check`] first, so a wrong shape is an error and never a wrong file.
 //! Check: each rule of `check` is broken once by a test; positions follow from ray geometry.
 
-use super::error::{OutputError, OutputResult, increasing, same_length};
+use super::checks::{increasing, same_length};
 use super::site::Site;
 use super::utc::UtcTime;
+use crate::Error;
 use crate::beams::{Direction, SweepMode};
 use ndarray::{Array2, Array3, Axis};
 use std::f64::consts::FRAC_PI_2;
@@ -301,12 +302,12 @@ impl VelocityMap {
     /// # Errors
     /// The first rule that is broken: no rays or sweeps, times or ranges that do not increase, sweeps that do not tile the
     /// rays in order, a field of another shape, a repeated field name, an infinite value.
-    pub fn check(&self) -> OutputResult<()> {
+    pub fn check(&self) -> Result<(), Error> {
         increasing("range_m", &self.range_m)?;
         let times: Vec<f64> = self.rays.iter().map(|r| r.time_s).collect();
         increasing("ray time_s", &times)?;
         if self.range_m[0] <= 0.0 {
-            return Err(OutputError::value(
+            return Err(Error::value(
                 "range_m",
                 format!("{:?}", self.range_m[0]),
                 "must be positive",
@@ -315,7 +316,7 @@ impl VelocityMap {
         self.check_rays()?;
         for (i, field) in self.fields.iter().enumerate() {
             if self.fields[..i].iter().any(|f| f.name == field.name) {
-                return Err(OutputError::Duplicate {
+                return Err(Error::Duplicate {
                     what: "field",
                     name: field.name.clone(),
                 });
@@ -325,10 +326,10 @@ impl VelocityMap {
         Ok(())
     }
 
-    fn check_rays(&self) -> OutputResult<()> {
+    fn check_rays(&self) -> Result<(), Error> {
         for (i, ray) in self.rays.iter().enumerate() {
             if !(ray.elevation_rad.is_finite() && ray.azimuth_rad.is_finite()) {
-                return Err(OutputError::value(
+                return Err(Error::value(
                     format!("ray {i} angles"),
                     format!("{}, {}", ray.elevation_rad, ray.azimuth_rad),
                     "must be finite",
@@ -340,22 +341,18 @@ impl VelocityMap {
             let sweep = self.rays[*first].sweep;
             if sweep != expected {
                 let allowed = format!("sweeps tile the rays in order: {expected} is next");
-                return Err(OutputError::value(
-                    format!("ray {first} sweep"),
-                    sweep,
-                    allowed,
-                ));
+                return Err(Error::value(format!("ray {first} sweep"), sweep, allowed));
             }
         }
         same_length("sweeps", self.sweeps.len(), "the rays", bounds.len())
     }
 
-    fn check_field(&self, field: &Field) -> OutputResult<()> {
+    fn check_field(&self, field: &Field) -> Result<(), Error> {
         let (rays, gates) = field.values.dim();
         same_length(&field.name, rays, "rays", self.rays.len())?;
         same_length(&field.name, gates, "range_m", self.range_m.len())?;
         if let Some(bad) = field.values.iter().find(|v| v.is_infinite()) {
-            return Err(OutputError::value(
+            return Err(Error::value(
                 &field.name,
                 bad,
                 "must be finite, or NaN where missing",
@@ -399,7 +396,7 @@ impl CrossPlanes {
     ///
     /// # Errors
     /// An axis that is empty or does not increase, or an array of another shape.
-    pub fn check(&self) -> OutputResult<()> {
+    pub fn check(&self) -> Result<(), Error> {
         increasing("tau", &self.tau)?;
         increasing("time_s", &self.time_s)?;
         increasing("y_m", &self.y_m)?;
@@ -411,7 +408,7 @@ impl CrossPlanes {
             same_length(name, z, "z_m", self.z_m.len())?;
             same_length(name, y, "y_m", self.y_m.len())?;
             if let Some(bad) = array.iter().find(|v| v.is_infinite()) {
-                return Err(OutputError::value(
+                return Err(Error::value(
                     name,
                     bad,
                     "must be finite, or NaN where missing",

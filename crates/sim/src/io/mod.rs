@@ -41,11 +41,11 @@ pub mod cf_planes;
 pub mod cf_signals;
 pub mod cf_spectra;
 pub mod cfradial;
+mod checks;
 pub mod csv;
 pub mod csv_input;
 pub mod data_set;
 pub(crate) mod edges;
-mod error;
 mod existing;
 pub mod fields;
 pub mod hpl;
@@ -66,10 +66,9 @@ pub mod zarr;
 
 pub use atomic::{FileGroup, write_atomic};
 pub use cf_spectra::Spectra;
-pub use csv::Table;
-pub use error::{OutputError, OutputResult};
 #[cfg(feature = "plots")]
-pub(crate) use error::{increasing, same_length};
+pub(crate) use checks::{increasing, same_length};
+pub use csv::Table;
 pub use existing::Existing;
 pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};

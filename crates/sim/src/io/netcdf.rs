@@ -3,9 +3,10 @@
 //! The layouts live in `cfradial` and `cf_planes`; nothing here knows what a radar is.
 //! Check: their tests read the bytes with an independent reader; here they are held against those of another encoder.
 
-use super::error::{OutputError, OutputResult, same_length};
+use super::checks::same_length;
 use super::parts::FileParts;
 use super::provenance::Provenance;
+use crate::Error;
 use std::collections::BTreeMap;
 
 /// The whole file is held in memory, unless ranks share it; a larger result belongs in one file per time.
@@ -197,7 +198,7 @@ impl Layout {
     }
 
     /// The bytes of the file. The provenance follows the global attributes, each entry as text.
-    pub(crate) fn into_bytes(self, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    pub(crate) fn into_bytes(self, provenance: &Provenance) -> Result<Vec<u8>, Error> {
         self.into_parts(provenance, true).map(FileParts::into_bytes)
     }
 
@@ -206,7 +207,7 @@ impl Layout {
         mut self,
         provenance: &Provenance,
         is_first: bool,
-    ) -> OutputResult<FileParts> {
+    ) -> Result<FileParts, Error> {
         self.check()?;
         self.globals.extend(provenance.entries());
         let sizes: Vec<u64> = self
@@ -217,7 +218,7 @@ impl Layout {
         if let Some(size) = sizes.iter().find(|size| **size > LARGEST_VARIABLE) {
             let reason =
                 format!("a variable of {size} bytes, at most {LARGEST_VARIABLE}: take fewer cells");
-            return Err(OutputError::unsupported("NetCDF", reason));
+            return Err(Error::unsupported("NetCDF", reason));
         }
         // The places of the data do not change the length of the head.
         let mut length = self.head(&sizes, &vec![0; sizes.len()]).len() as u64;
@@ -262,20 +263,17 @@ impl Layout {
     }
 
     /// Checks the lengths, and that names are valid and differ.
-    fn check(&self) -> OutputResult<()> {
+    fn check(&self) -> Result<(), Error> {
         for (place, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
             if name.is_empty() || name.contains(['/', '\0']) {
-                return Err(OutputError::unsupported(
-                    "NetCDF",
-                    format!("'{name}' is no name"),
-                ));
+                return Err(Error::unsupported("NetCDF", format!("'{name}' is no name")));
             }
             if self.variables[..place]
                 .iter()
                 .any(|other| other.name == *name)
             {
-                return Err(OutputError::Duplicate {
+                return Err(Error::Duplicate {
                     what: "name in NetCDF",
                     name: name.clone(),
                 });
@@ -297,7 +295,7 @@ impl Layout {
             let reason = format!(
                 "{total} bytes in one file, at most {MAX_BYTES}: write one file per time or sweep"
             );
-            return Err(OutputError::unsupported("NetCDF", reason));
+            return Err(Error::unsupported("NetCDF", reason));
         }
         Ok(())
     }
@@ -449,13 +447,13 @@ mod tests {
         beyond.variables[0].first = Some(1);
         assert!(matches!(
             beyond.into_parts(&example(), true),
-            Err(OutputError::Length { .. })
+            Err(Error::Length { .. })
         ));
         let mut large = layout();
         (large.dims[0].1, large.variables[0].first) = (1 << 30, Some(0));
         large.variables.truncate(1);
         let error = large.into_parts(&example(), true).unwrap_err();
-        assert!(matches!(error, OutputError::Unsupported { .. }), "{error}");
+        assert!(matches!(error, Error::Unsupported { .. }), "{error}");
     }
 
     #[test]
@@ -478,7 +476,7 @@ mod tests {
         assert!(
             matches!(
                 error,
-                OutputError::Length {
+                Error::Length {
                     expected: 6,
                     actual: 5,
                     ..

@@ -1,7 +1,8 @@
 //! Raw signals at the border to files.
 //! Check: signals whose lengths do not match are refused.
 
-use super::error::{OutputError, OutputResult, increasing, same_length};
+use super::checks::{increasing, same_length};
+use crate::Error;
 use ndarray::ArrayView2;
 
 /// The signals of a scan, pulse by pulse, one realisation after the other; the large arrays are borrowed.
@@ -46,7 +47,7 @@ impl RawSignals<'_> {
     ///
     /// # Errors
     /// Lengths that do not match, times that do not increase, values that are not finite.
-    pub fn check(&self) -> OutputResult<()> {
+    pub fn check(&self) -> Result<(), Error> {
         increasing("time_s", &self.time_s)?;
         let (records, samples) = self.current_a.dim();
         let times = self.time_s.len();
@@ -74,7 +75,7 @@ impl RawSignals<'_> {
             .iter()
             .chain(self.quadrature_a.iter().flatten());
         match values.find(|a| !a.is_finite()) {
-            Some(bad) => Err(OutputError::value("current_a", bad, "must be finite")),
+            Some(bad) => Err(Error::value("current_a", bad, "must be finite")),
             None => Ok(()),
         }
     }

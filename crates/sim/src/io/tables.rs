@@ -2,15 +2,15 @@
 //! Check: positions are recomputed from angles, and a value is looked up at its (ray, gate).
 
 use super::csv::Table;
-use super::error::OutputResult;
 use super::map::{CrossPlanes, VelocityMap};
+use crate::Error;
 
 /// The table of a map: `tau, range_m, elevation_rad, y_m, z_m`, then the fields in order, then `x_m` of a map with a flight and
 /// `azimuth_rad, time_s, sweep, ray`. One row per (ray, gate), the gate running fastest.
 ///
 /// # Errors
 /// What [`VelocityMap::check`] finds.
-pub fn map_table(map: &VelocityMap) -> OutputResult<Table> {
+pub fn map_table(map: &VelocityMap) -> Result<Table, Error> {
     map.check()?;
     let mut tau = Vec::new();
     let mut range_m = Vec::new();
@@ -58,7 +58,7 @@ pub fn map_table(map: &VelocityMap) -> OutputResult<Table> {
 ///
 /// # Errors
 /// What [`CrossPlanes::check`] finds.
-pub fn planes_table(planes: &CrossPlanes) -> OutputResult<Table> {
+pub fn planes_table(planes: &CrossPlanes) -> Result<Table, Error> {
     planes.check()?;
     let mut tau = Vec::new();
     let mut z_m = Vec::new();
@@ -87,7 +87,7 @@ pub fn planes_table(planes: &CrossPlanes) -> OutputResult<Table> {
 mod tests {
     use super::super::samples;
     use super::*;
-    use crate::io::{OutputError, csv::Column};
+    use crate::io::csv::Column;
 
     fn floats<'a>(table: &'a Table, name: &str) -> &'a [f64] {
         match table.columns().iter().find(|(n, _)| n == name) {
@@ -162,35 +162,35 @@ mod tests {
         };
         assert!(matches!(
             refused(&|m| m.range_m[1] = m.range_m[0]),
-            OutputError::Value { .. }
+            Error::Value { .. }
         ));
         assert!(matches!(
             refused(&|m| m.rays[1].time_s = m.rays[0].time_s),
-            OutputError::Value { .. }
+            Error::Value { .. }
         ));
         assert!(matches!(
             refused(&|m| m.rays[2].sweep = 1),
-            OutputError::Value { .. }
+            Error::Value { .. }
         ));
         assert!(matches!(
             refused(&|m| {
                 m.sweeps.pop();
             }),
-            OutputError::Length { .. }
+            Error::Length { .. }
         ));
         assert!(matches!(
             refused(&|m| m.fields[0].values[[0, 0]] = f64::INFINITY),
-            OutputError::Value { .. }
+            Error::Value { .. }
         ));
         assert!(matches!(
             refused(&|m| m.fields[1].name = m.fields[0].name.clone()),
-            OutputError::Duplicate { .. }
+            Error::Duplicate { .. }
         ));
         assert!(matches!(
             refused(&|m| {
                 m.range_m.pop();
             }),
-            OutputError::Length { .. }
+            Error::Length { .. }
         ));
     }
 }

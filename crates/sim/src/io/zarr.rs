@@ -9,7 +9,6 @@
 //! there whole or not at all.
 
 use super::atomic::StagingFolder;
-use super::error::OutputResult;
 use super::number::{ByteOrder, NumberType};
 use crate::Error;
 use flate2::{Compression, GzBuilder, read::GzDecoder};
@@ -281,7 +280,7 @@ impl Writer {
     ///
     /// # Errors
     /// Files cannot be written there.
-    pub fn new(root: &Path) -> OutputResult<Self> {
+    pub fn new(root: &Path) -> Result<Self, Error> {
         let parent = root.parent().filter(|p| !p.as_os_str().is_empty());
         Ok(Self {
             root: root.to_owned(),
@@ -294,7 +293,7 @@ impl Writer {
     ///
     /// # Errors
     /// The refusal of the system; nothing of the file is then there.
-    pub fn put(&self, key: &str, content: &[u8]) -> OutputResult<()> {
+    pub fn put(&self, key: &str, content: &[u8]) -> Result<(), Error> {
         let unique = self.files.fetch_add(1, Ordering::Relaxed);
         self.staging.put_file(unique, &self.root.join(key), content)
     }
@@ -303,7 +302,7 @@ impl Writer {
     ///
     /// # Errors
     /// As [`Self::put`].
-    pub fn put_beside(&self, name: &str, content: &[u8]) -> OutputResult<()> {
+    pub fn put_beside(&self, name: &str, content: &[u8]) -> Result<(), Error> {
         let unique = self.files.fetch_add(1, Ordering::Relaxed);
         let path = self.root.with_file_name(name);
         self.staging.put_file(unique, &path, content)

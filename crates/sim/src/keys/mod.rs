@@ -21,6 +21,7 @@ pub(crate) use declare::{
 pub(crate) use key::{Key, Kind, join};
 pub(crate) use limit::{ABOVE_ZERO, FINITE};
 pub(crate) use limit::{ABOVE_ZERO_OR_INF, Checker, Is, Limit, Named, Number, ZERO_OR_MORE, side};
-pub use problem::{Problem, SceneError};
+pub use problem::Problem;
+pub(crate) use problem::listed;
 pub(crate) use vet::{Format, Text, lines_with_keys, value_at};
 pub(crate) use words::{near, one_of, unit_of};

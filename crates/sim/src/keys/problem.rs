@@ -1,7 +1,7 @@
 //! Why a scene or a case was refused: the file, the line, the key, the value and what is allowed.
 
 use std::fmt::{Display, Formatter, Result};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A value that a scene or a case may not have.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,42 +45,11 @@ impl Display for Problem {
     }
 }
 
-/// Why a scene or a case was refused.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SceneError {
-    /// The file cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The text is no TOML.
-    #[error("{}:{line}: {message}", path.display())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// What is wrong and what is allowed.
-        message: String,
-    },
-    /// Unknown or missing keys, values of the wrong kind or out of their limits.
-    #[error("{}", list(path, problems))]
-    Invalid {
-        /// The file.
-        path: PathBuf,
-        /// All of them, in the order of their lines.
-        problems: Vec<Problem>,
-    },
-}
-
 /// Most problems that a message lists.
 const MOST_LINES: usize = 50;
 
-fn list(path: &Path, problems: &[Problem]) -> String {
+/// Problems of a file, each in its line.
+pub(crate) fn listed(path: &Path, problems: &[Problem]) -> String {
     let path = path.display();
     let mut lines = Vec::new();
     for problem in problems.iter().take(MOST_LINES) {

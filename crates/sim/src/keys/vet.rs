@@ -3,8 +3,9 @@
 
 use super::declare::{Declared, from_table};
 use super::key::{Key, Kind, join};
-use super::problem::{Problem, SceneError};
+use super::problem::Problem;
 use super::words::{near, one_of, quote, table_with, wanted};
+use crate::Error;
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
@@ -35,7 +36,7 @@ impl<'a> Text<'a> {
     ///
     /// # Errors
     /// The line and what is wrong, without the text that is there.
-    pub(crate) fn parse(text: &'a str, path: &'a Path) -> Result<Self, SceneError> {
+    pub(crate) fn parse(text: &'a str, path: &'a Path) -> Result<Self, Error> {
         let mut breaks = Vec::new();
         for (index, byte) in text.bytes().enumerate() {
             if byte == b'\n' {
@@ -52,7 +53,7 @@ impl<'a> Text<'a> {
             Err(error) => {
                 let index = error.span().map_or(0, |span| span.start);
                 let key = key_of_line(text, index).map(|key| format!("{}: ", quote(key)));
-                Err(SceneError::Malformed {
+                Err(Error::Malformed {
                     path: path.to_owned(),
                     line: breaks.partition_point(|end| *end < index) + 1,
                     message: format!(
@@ -103,7 +104,7 @@ impl<'a> Text<'a> {
     ///
     /// # Errors
     /// Every key that is not known, has a value of the wrong kind or is missing, in the order of the lines.
-    pub(crate) fn vet(&self, format: &Format<'_>) -> Result<toml::Table, SceneError> {
+    pub(crate) fn vet(&self, format: &Format<'_>) -> Result<toml::Table, Error> {
         self.walk(format, None).map(|(table, _)| table)
     }
 
@@ -114,7 +115,7 @@ impl<'a> Text<'a> {
     pub(crate) fn vet_known(
         &self,
         format: &Format<'_>,
-    ) -> Result<(toml::Table, Vec<String>), SceneError> {
+    ) -> Result<(toml::Table, Vec<String>), Error> {
         self.walk(format, Some(Vec::new()))
     }
 
@@ -122,7 +123,7 @@ impl<'a> Text<'a> {
         &self,
         format: &Format<'_>,
         skipped: Option<Vec<String>>,
-    ) -> Result<(toml::Table, Vec<String>), SceneError> {
+    ) -> Result<(toml::Table, Vec<String>), Error> {
         let mut walk = Walk {
             document: self,
             format,
@@ -141,8 +142,8 @@ impl<'a> Text<'a> {
     ///
     /// # Errors
     /// A key that does not fit; a table from [`Self::vet`] has none.
-    pub(crate) fn read<T: Declared>(&self, table: toml::Table) -> Result<T, SceneError> {
-        from_table(table).ok_or_else(|| SceneError::Malformed {
+    pub(crate) fn read<T: Declared>(&self, table: toml::Table) -> Result<T, Error> {
+        from_table(table).ok_or_else(|| Error::Malformed {
             path: self.path.to_owned(),
             line: 1,
             message: "a value does not fit its key".into(),
@@ -150,7 +151,7 @@ impl<'a> Text<'a> {
     }
 
     /// Problems with the lines where the text states their keys, and values as it writes them.
-    pub(crate) fn located(&self, mut problems: Vec<Problem>) -> SceneError {
+    pub(crate) fn located(&self, mut problems: Vec<Problem>) -> Error {
         for problem in &mut problems {
             if let Some(written) = self.written(&problem.key) {
                 problem.value = written;
@@ -164,9 +165,9 @@ impl<'a> Text<'a> {
         self.invalid(problems)
     }
 
-    fn invalid(&self, mut problems: Vec<Problem>) -> SceneError {
+    fn invalid(&self, mut problems: Vec<Problem>) -> Error {
         problems.sort_by_key(|problem| problem.line);
-        SceneError::Invalid {
+        Error::Invalid {
             path: self.path.to_owned(),
             problems,
         }

@@ -17,7 +17,7 @@ use ndarray::{Array1, Array2, ArrayView2};
 use num_complex::Complex;
 use wakescope_estimate::{
     Scan,
-    map::{ErrorMap, PolarPoint, ScanGeometry, ScanSums},
+    map::{ErrorStatistics, PolarPoint, ScanGeometry, ScanSums},
     window::Sample,
 };
 use wakescope_signal::RangeFilter;
@@ -118,7 +118,6 @@ struct Mapper<'p, S> {
     noise: Vec<PointNoise>,
     /// The truth, the first realisation, and the errors of each.
     map: VelocityEstimates,
-    errors: ErrorMap<ndarray::Ix2>,
     gates: Array2<GateSums>,
 }
 
@@ -146,7 +145,6 @@ impl<'p, S: Sample> Mapper<'p, S> {
             places,
             points,
             map,
-            errors: ErrorMap::new(ndarray::Dim(shape)),
             gates: Array2::default(shape),
         })
     }
@@ -170,7 +168,6 @@ impl<'p, S: Sample> Mapper<'p, S> {
         let truth_m_s = own_truth_m_s
             .as_ref()
             .map_or(&map.v_pulse_m_s, |[pulse_m_s, _]| pulse_m_s);
-        self.errors.add(velocity.view(), truth_m_s.view())?;
         let error_m_s = &velocity - truth_m_s;
         if map.scans.is_empty() {
             let known =
@@ -194,7 +191,9 @@ impl<'p, S: Sample> Mapper<'p, S> {
     /// `clipped_fraction` is that of the samples that the converter clipped.
     fn finish(self, plan: &Plan, clipped_fraction: f64) -> Result<VelocityEstimates, Error> {
         let Self { mut map, gates, .. } = self;
-        let statistics = self.errors.statistics();
+        let statistics = Array2::from_shape_fn(gates.dim(), |cell| {
+            ErrorStatistics::of(map.scans.iter().map(|scan| scan.error_m_s[cell]))
+        });
         let noise_a2 = self.estimator.tools.noise.power_a2;
         map.level = gates.map(|gate| gate.level);
         map.n_eff = gates.map(|gate| gate.n_eff);

@@ -217,7 +217,7 @@ fn refused(file: &SceneFile, t: &RefractiveTurbulence, error: wakescope_optics::
             None => String::new(),
         };
     }
-    file.located(problems).into()
+    file.located(problems)
 }
 
 /// A limit of the first of two keys of the grid; of the other one or of the strength of the turbulence if the file leaves the first to its default.

@@ -164,5 +164,5 @@ fn above_ground(file: &SceneFile, scan: &Schedule) -> Result<(), Error> {
             -low(&lowest)
         ),
     );
-    Err(file.located(vec![problem]).into())
+    Err(file.located(vec![problem]))
 }

@@ -1,7 +1,6 @@
 //! Axes: range from the data, round ticks, labels, and the place of a value on the paper. Check: ticks are multiples
 //! of 1, 2 or 5 times a power of ten inside the range; a logarithmic axis puts decades at equal distances.
-
-use crate::io::{OutputError, OutputResult};
+use crate::Error;
 
 /// One axis of a plot, as the caller asks for it.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,14 +49,14 @@ impl Axis {
         &self,
         values: impl Iterator<Item = f64>,
         pad: f64,
-    ) -> OutputResult<(f64, f64)> {
+    ) -> Result<(f64, f64), Error> {
         if let Some((low, high)) = self.range {
             if low < high && self.is_usable(low) && self.is_usable(high) {
                 return Ok((low, high));
             }
             let name = format!("range of axis '{}'", self.label);
             let range = format!("{low} to {high}");
-            return Err(OutputError::value(
+            return Err(Error::value(
                 name,
                 range,
                 "finite and increasing, positive on a logarithmic axis",

@@ -8,7 +8,8 @@ use super::colour::curve_colour;
 use super::drawing::{Anchor, Frame, Shape};
 use super::font::Font;
 use super::frame::{BOTTOM, GRID, HALF_HEIGHT, LEFT, TICK_SIZE, inner, panel, top_room};
-use crate::io::{OutputResult, same_length};
+use crate::Error;
+use crate::io::same_length;
 
 const RIGHT: f64 = 24.0;
 
@@ -49,7 +50,8 @@ impl CurvePlot {
         self
     }
 
-    fn ranges(&self) -> OutputResult<((f64, f64), (f64, f64))> {
+    /// Ranges of x and y.
+    fn ranges(&self) -> Result<[(f64, f64); 2], Error> {
         let mut x = Vec::new();
         let mut y = Vec::new();
         for series in &self.series {
@@ -68,20 +70,20 @@ impl CurvePlot {
         };
         let x = self.x.resolve(x.into_iter(), pad)?;
         let y = self.y.resolve(y.into_iter(), 0.06)?;
-        Ok((x, y))
+        Ok([x, y])
     }
 
     /// Height of the panel at that width, drawing units.
-    pub(crate) fn height(&self, width: f64) -> OutputResult<f64> {
+    pub(crate) fn height(&self, width: f64) -> Result<f64, Error> {
         if !self.equal_scales {
             return Ok(self.shape * width);
         }
-        let (x, y) = self.ranges()?;
+        let [x, y] = self.ranges()?;
         let inner = (width - LEFT - RIGHT) * (y.1 - y.0) / (x.1 - x.0);
         Ok(inner.clamp(120.0, 1.2 * width) + top_room(&self.title) + BOTTOM)
     }
 
-    pub(crate) fn draw(&self, cell: Frame, font: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
+    pub(crate) fn draw(&self, cell: Frame, font: &Font, out: &mut Vec<Shape>) -> Result<(), Error> {
         for series in &self.series {
             if let Some(band) = &series.band {
                 same_length(
@@ -93,7 +95,7 @@ impl CurvePlot {
             }
         }
         let frame = inner(cell, RIGHT, &self.title);
-        let (mut x_range, mut y_range) = self.ranges()?;
+        let [mut x_range, mut y_range] = self.ranges()?;
         if self.equal_scales && !self.x.log && !self.y.log {
             // A unit is equally long on both axes.
             let unit =

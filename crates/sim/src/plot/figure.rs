@@ -9,7 +9,8 @@ use super::isosurface::IsosurfacePlot;
 use super::map::MapPlot;
 use super::png_file::{encode, paint};
 use super::svg::svg_text;
-use crate::io::{FileGroup, OutputError, OutputResult, Provenance};
+use crate::Error;
+use crate::io::{FileGroup, Provenance};
 
 const TITLE_ROOM: f64 = 40.0;
 const MARGIN: f64 = 10.0;
@@ -26,7 +27,7 @@ pub enum Panel {
 }
 
 impl Panel {
-    fn height(&self, width: f64) -> OutputResult<f64> {
+    fn height(&self, width: f64) -> Result<f64, Error> {
         match self {
             Self::Curves(plot) => plot.height(width),
             Self::Map(plot) => Ok(plot.height(width)),
@@ -58,7 +59,7 @@ impl From<MapPlot> for Panel {
 /// let figure = Figure::stacked([plot]);
 /// assert!(figure.svg(&origin)?.starts_with("<svg"));
 /// assert_eq!(figure.png(&origin)?[1..4], *b"PNG");
-/// # Ok::<(), wakescope_sim::io::OutputError>(())
+/// # Ok::<(), wakescope_sim::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
@@ -102,7 +103,7 @@ impl Figure {
     ///
     /// # Errors
     /// A range that cannot be drawn, a band of another length than its curve, a size out of range.
-    pub fn svg(&self, provenance: &Provenance) -> OutputResult<String> {
+    pub fn svg(&self, provenance: &Provenance) -> Result<String, Error> {
         svg_text(&self.draw()?, provenance)
     }
 
@@ -110,7 +111,7 @@ impl Figure {
     ///
     /// # Errors
     /// As [`Self::svg`].
-    pub fn png(&self, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    pub fn png(&self, provenance: &Provenance) -> Result<Vec<u8>, Error> {
         encode([paint(&self.draw()?)], 0.0, Some(provenance))
     }
 
@@ -118,7 +119,7 @@ impl Figure {
     ///
     /// # Errors
     /// As [`Self::svg`].
-    pub fn svg_and_png(&self, provenance: &Provenance) -> OutputResult<(String, Vec<u8>)> {
+    pub fn svg_and_png(&self, provenance: &Provenance) -> Result<(String, Vec<u8>), Error> {
         let drawing = self.draw()?;
         Ok((
             svg_text(&drawing, provenance)?,
@@ -135,17 +136,17 @@ impl Figure {
         files: &mut FileGroup,
         name: &str,
         provenance: &Provenance,
-    ) -> OutputResult<()> {
+    ) -> Result<(), Error> {
         let (svg, png) = self.svg_and_png(provenance)?;
         files.add(&format!("{name}.svg"), svg)?;
         files.add(&format!("{name}.png"), png)
     }
 
     /// The shapes of all panels; a row is as high as its highest panel, and maps beside it keep their own height.
-    pub(crate) fn draw(&self) -> OutputResult<Drawing> {
+    pub(crate) fn draw(&self) -> Result<Drawing, Error> {
         if self.columns == 0 || !(200.0..=10_000.0).contains(&self.width) {
             let value = format!("{} columns, width {}", self.columns, self.width);
-            return Err(OutputError::value(
+            return Err(Error::value(
                 "figure",
                 value,
                 "at least one column, width 200 to 10000",
@@ -202,9 +203,9 @@ impl Figure {
 ///
 /// # Errors
 /// No figures, figures of different sizes, a time that is not between 0.01 s and 60 s, and what [`Figure::png`] finds.
-pub fn apng(figures: &[Figure], frame_s: f64, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn apng(figures: &[Figure], frame_s: f64, provenance: &Provenance) -> Result<Vec<u8>, Error> {
     if !(0.01..=60.0).contains(&frame_s) {
-        return Err(OutputError::value("frame_s", frame_s, "0.01 to 60 s"));
+        return Err(Error::value("frame_s", frame_s, "0.01 to 60 s"));
     }
     encode(
         figures.iter().map(|figure| paint(&figure.draw()?)),

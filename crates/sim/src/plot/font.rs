@@ -2,7 +2,7 @@
 //! Check: widths add up, and a raised part is narrower than the same letters on the line.
 
 use super::drawing::runs;
-use crate::io::{OutputError, OutputResult};
+use crate::Error;
 use tiny_skia::{Path, PathBuilder, Transform};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
@@ -12,9 +12,9 @@ pub(crate) struct Font {
 }
 
 impl Font {
-    pub(crate) fn load() -> OutputResult<Self> {
+    pub(crate) fn load() -> Result<Self, Error> {
         let face = Face::parse(epaint_default_fonts::UBUNTU_LIGHT, 0)
-            .map_err(|e| OutputError::unsupported("font", e))?;
+            .map_err(|e| Error::unsupported("font", e))?;
         Ok(Self { face })
     }
 

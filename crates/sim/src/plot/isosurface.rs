@@ -11,7 +11,8 @@ use super::colour::Rgb;
 use super::drawing::{Anchor, Frame, Shape};
 use super::frame::{TICK_SIZE, top_room};
 use super::png_file::pixels;
-use crate::io::{OutputError, OutputResult, increasing, same_length};
+use crate::Error;
+use crate::io::{increasing, same_length};
 use rayon::prelude::*;
 use tiny_skia::Pixmap;
 
@@ -109,7 +110,7 @@ impl IsosurfacePlot {
         inner.clamp(60.0, 1.5 * width) + 2.0 * MARGIN + top_room(&self.title)
     }
 
-    pub(crate) fn draw(&self, cell: Frame, out: &mut Vec<Shape>) -> OutputResult<()> {
+    pub(crate) fn draw(&self, cell: Frame, out: &mut Vec<Shape>) -> Result<(), Error> {
         self.check_surfaces()?;
         let camera = self.camera();
         let scale = self.scale(&camera, cell);
@@ -164,10 +165,10 @@ impl IsosurfacePlot {
         Ok(())
     }
 
-    fn check_surfaces(&self) -> OutputResult<()> {
+    fn check_surfaces(&self) -> Result<(), Error> {
         for surface in &self.surfaces {
             if !(surface.level.is_finite() && (0.0..=1.0).contains(&surface.opacity)) {
-                return Err(OutputError::value(
+                return Err(Error::value(
                     "surface",
                     format!("level {}, opacity {}", surface.level, surface.opacity),
                     "a finite level, opacity 0 to 1",
@@ -253,7 +254,7 @@ impl IsosurfacePlot {
     }
 
     /// The lit surfaces on a transparent ground.
-    fn pixels(&self, camera: &Camera, [width, height]: [u32; 2]) -> OutputResult<Pixmap> {
+    fn pixels(&self, camera: &Camera, [width, height]: [u32; 2]) -> Result<Pixmap, Error> {
         let levels: Vec<f64> = self.surfaces.iter().map(|s| s.level).collect();
         let mut rgba = vec![0; 4 * width as usize * height as usize];
         rgba.as_chunks_mut::<4>()
@@ -330,15 +331,11 @@ impl Volume {
     ///
     /// # Errors
     /// Axes with fewer than two points or that do not increase, another number of values than points.
-    pub fn new(axis_m: [Vec<f64>; 3], values: Vec<f32>) -> OutputResult<Self> {
+    pub fn new(axis_m: [Vec<f64>; 3], values: Vec<f32>) -> Result<Self, Error> {
         for (name, axis) in ["x axis", "y axis", "z axis"].into_iter().zip(&axis_m) {
             increasing(name, axis)?;
             if axis.len() < 2 {
-                return Err(OutputError::value(
-                    name,
-                    axis.len(),
-                    "at least two positions",
-                ));
+                return Err(Error::value(name, axis.len(), "at least two positions"));
             }
         }
         same_length(

@@ -11,8 +11,9 @@ use super::drawing::{Anchor, Frame, INK, Shape};
 use super::font::Font;
 use super::frame::{BOTTOM, LEFT, Side, TICK_SIZE, axis, inner, panel, top_room};
 use super::png_file::pixels;
+use crate::Error;
 use crate::beams::SweepMode;
-use crate::io::{OutputError, OutputResult, Unit, VelocityMap};
+use crate::io::{Unit, VelocityMap};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use tiny_skia::Pixmap;
 
@@ -50,16 +51,16 @@ impl MapPlot {
     ///
     /// # Errors
     /// What [`VelocityMap::check`] finds, no such sweep or field.
-    pub fn new(map: &VelocityMap, sweep: usize, field: &str) -> OutputResult<Self> {
+    pub fn new(map: &VelocityMap, sweep: usize, field: &str) -> Result<Self, Error> {
         map.check()?;
         if sweep >= map.sweeps.len() {
-            return Err(OutputError::value(
+            return Err(Error::value(
                 "sweep",
                 sweep,
                 format!("below {}", map.sweeps.len()),
             ));
         }
-        let field = map.field(field).ok_or_else(|| OutputError::Missing {
+        let field = map.field(field).ok_or_else(|| Error::Missing {
             what: format!("field {field}"),
             needed: "the map must have the field that is to be drawn".into(),
         })?;
@@ -139,10 +140,10 @@ impl MapPlot {
         inner.clamp(90.0, 1.5 * width) + top_room(&self.title) + BOTTOM
     }
 
-    pub(crate) fn draw(&self, cell: Frame, font: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
+    pub(crate) fn draw(&self, cell: Frame, font: &Font, out: &mut Vec<Shape>) -> Result<(), Error> {
         let (low, high) = self.colours.range();
         if !(low < high && low.is_finite() && high.is_finite()) {
-            return Err(OutputError::value(
+            return Err(Error::value(
                 "range of colours",
                 format!("{low} to {high}"),
                 "finite and increasing",
@@ -193,7 +194,7 @@ impl MapPlot {
     }
 
     /// The bar of colours beside the map.
-    fn draw_bar(&self, frame: &Frame, font: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
+    fn draw_bar(&self, frame: &Frame, font: &Font, out: &mut Vec<Shape>) -> Result<(), Error> {
         let (low, high) = self.colours.range();
         let bar = Frame {
             left: frame.right() + 18.0,
@@ -429,7 +430,7 @@ impl Cells {
         z_m: (f64, f64),
         (width, height): (u32, u32),
         colours: &ColourMap,
-    ) -> OutputResult<Pixmap> {
+    ) -> Result<Pixmap, Error> {
         let of_cells: Vec<_> = self
             .values
             .iter()
@@ -523,11 +524,11 @@ mod tests {
         let map = samples::map();
         assert!(matches!(
             MapPlot::new(&map, 0, "nothing"),
-            Err(OutputError::Missing { .. })
+            Err(Error::Missing { .. })
         ));
         assert!(matches!(
             MapPlot::new(&map, 2, "v_exact"),
-            Err(OutputError::Value { .. })
+            Err(Error::Value { .. })
         ));
     }
 }

@@ -5,7 +5,8 @@
 use super::colour::Rgb;
 use super::drawing::{Drawing, INK, Shape, Text};
 use super::font::Font;
-use crate::io::{OutputError, OutputResult, Provenance};
+use crate::Error;
+use crate::io::Provenance;
 use tiny_skia::{
     Color, FillRule, FilterQuality, IntSize, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap,
     PixmapPaint, Stroke, StrokeDash, Transform,
@@ -17,11 +18,11 @@ pub(crate) const SCALE: f64 = 1.2;
 const EMBOLDEN: f64 = 0.022;
 
 /// The pixels of a drawing, none of them transparent.
-pub(crate) fn paint(drawing: &Drawing) -> OutputResult<Pixmap> {
+pub(crate) fn paint(drawing: &Drawing) -> Result<Pixmap, Error> {
     let [width, height] =
         [drawing.width, drawing.height].map(|length| (length * SCALE).round() as u32);
     let mut pixmap = Pixmap::new(width, height).ok_or_else(|| {
-        OutputError::value(
+        Error::value(
             "picture size",
             format!("{width} x {height}"),
             "1 to 32767 pixels each",
@@ -38,11 +39,11 @@ pub(crate) fn paint(drawing: &Drawing) -> OutputResult<Pixmap> {
 }
 
 /// Pixels, row by row from the top: red, green, blue, times the opacity, and the opacity.
-pub(crate) fn pixels(width: u32, height: u32, rgba: Vec<u8>) -> OutputResult<Pixmap> {
+pub(crate) fn pixels(width: u32, height: u32, rgba: Vec<u8>) -> Result<Pixmap, Error> {
     let size = IntSize::from_wh(width, height);
     size.and_then(|size| Pixmap::from_vec(rgba, size))
         .ok_or_else(|| {
-            OutputError::value(
+            Error::value(
                 "embedded picture",
                 format!("{width} x {height}"),
                 "4 bytes a pixel, at least one pixel",
@@ -176,21 +177,21 @@ fn path(points: &[(f64, f64)]) -> Option<Path> {
     builder.finish()
 }
 
-fn refused(error: png::EncodingError) -> OutputError {
-    OutputError::unsupported("PNG", error)
+fn refused(error: png::EncodingError) -> Error {
+    Error::unsupported("PNG", error)
 }
 
 /// PNG bytes of one picture, APNG bytes of several, with the provenance in iTXt chunks where it is given.
 pub(crate) fn encode(
-    pictures: impl IntoIterator<Item = OutputResult<Pixmap>, IntoIter: ExactSizeIterator>,
+    pictures: impl IntoIterator<Item = Result<Pixmap, Error>, IntoIter: ExactSizeIterator>,
     frame_s: f64,
     provenance: Option<&Provenance>,
-) -> OutputResult<Vec<u8>> {
+) -> Result<Vec<u8>, Error> {
     let mut pictures = pictures.into_iter();
     let count = pictures.len();
     let first = pictures
         .next()
-        .ok_or_else(|| OutputError::value("figures", 0, "at least one"))??;
+        .ok_or_else(|| Error::value("figures", 0, "at least one"))??;
     let size = (first.width(), first.height());
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, size.0, size.1);
@@ -211,11 +212,7 @@ pub(crate) fn encode(
         let picture = picture?;
         if (picture.width(), picture.height()) != size {
             let value = format!("{} x {}", picture.width(), picture.height());
-            return Err(OutputError::value(
-                "size of a figure",
-                value,
-                "that of the first",
-            ));
+            return Err(Error::value("size of a figure", value, "that of the first"));
         }
         writer
             .write_image_data(&picture.take_demultiplied())
@@ -324,7 +321,7 @@ mod tests {
             height: 20.0,
             shapes: vec![],
         };
-        assert!(matches!(paint(&drawing), Err(OutputError::Value { .. })));
+        assert!(matches!(paint(&drawing), Err(Error::Value { .. })));
     }
 
     fn figure(slope: f64, width: f64) -> Figure {

@@ -5,7 +5,8 @@
 use super::colour::Rgb;
 use super::drawing::{Anchor, Drawing, Frame, Shape, Text, runs};
 use super::png_file::encode;
-use crate::io::{OutputResult, Provenance};
+use crate::Error;
+use crate::io::Provenance;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
@@ -13,7 +14,7 @@ use base64::engine::general_purpose::STANDARD;
 const FAMILY: &str = "Ubuntu, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif";
 
 /// The whole file.
-pub(crate) fn svg_text(drawing: &Drawing, provenance: &Provenance) -> OutputResult<String> {
+pub(crate) fn svg_text(drawing: &Drawing, provenance: &Provenance) -> Result<String, Error> {
     let w = number(drawing.width);
     let h = number(drawing.height);
     let mut out = format!(
@@ -45,7 +46,7 @@ pub fn escape(text: &str) -> String {
         .fold(plain, |text, (sign, name)| text.replace(sign, name))
 }
 
-fn element(shape: &Shape) -> OutputResult<String> {
+fn element(shape: &Shape) -> Result<String, Error> {
     Ok(match shape {
         Shape::Line {
             points,
@@ -94,7 +95,7 @@ fn element(shape: &Shape) -> OutputResult<String> {
             let inner = shapes
                 .iter()
                 .map(element)
-                .collect::<OutputResult<String>>()?;
+                .collect::<Result<String, Error>>()?;
             format!(
                 "<svg {} viewBox=\"{corner}\" overflow=\"hidden\">\n{inner}</svg>\n",
                 place(frame)

@@ -23,7 +23,7 @@ mod retrieval;
 pub use crate::document::{Content, Document};
 pub use crate::io::Site;
 pub use crate::io::hash_of;
-pub use crate::keys::{Problem, SceneError};
+pub use crate::keys::Problem;
 pub use air::*;
 pub use atmosphere::*;
 pub use estimator::*;

@@ -1,6 +1,6 @@
 //! Reading a scene file, with errors that name the key, the value, what is allowed and the line.
 
-use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, idle};
+use super::{Problem, SCENE_EXAMPLES, Scene, TABLE2_TOML, idle};
 use crate::Error;
 use crate::document::{Content, Document};
 use crate::keys::{Format, Key, Text, join, keys_of, to_table, value_at};
@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 pub type SceneFile = Document<Scene>;
 
 impl Content for Scene {
-    fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
+    fn parse(text: &str, path: &Path) -> Result<Self, Error> {
         let read = Text::parse(text, path)?;
         checked(&read, read.vet(&scene_format())?)
     }
@@ -27,7 +27,7 @@ impl Content for Scene {
 }
 
 /// The scene of a table whose keys are known, if its values are allowed.
-fn checked(text: &Text<'_>, table: toml::Table) -> Result<Scene, SceneError> {
+fn checked(text: &Text<'_>, table: toml::Table) -> Result<Scene, Error> {
     let scene: Scene = text.read(table)?;
     let mut problems = scene.problems_where(&|key| text.line(key).is_some());
     problems.extend(idle::problems(&scene, text));
@@ -44,7 +44,7 @@ impl SceneFile {
     ///
     /// # Errors
     /// As [`SceneFile::parse`], but for these keys.
-    pub(crate) fn embedded(text: &str, path: &Path) -> Result<(Self, Option<String>), SceneError> {
+    pub(crate) fn embedded(text: &str, path: &Path) -> Result<(Self, Option<String>), Error> {
         let read = Text::parse(text, path)?;
         let (table, skipped) = read.vet_known(&scene_format())?;
         let scene = checked(&read, table)?;
@@ -67,7 +67,7 @@ impl SceneFile {
     ///
     /// # Errors
     /// Keys that do not exist, values of the wrong kind.
-    pub(crate) fn without_limits(text: &str, path: &Path) -> Result<Scene, SceneError> {
+    pub(crate) fn without_limits(text: &str, path: &Path) -> Result<Scene, Error> {
         let read = Text::parse(text, path)?;
         read.read(read.vet(&scene_format())?)
     }
@@ -89,7 +89,7 @@ impl SceneFile {
     ///
     /// # Errors
     /// All problems of the scene.
-    pub(crate) fn with(&self, scene: Scene) -> Result<Self, SceneError> {
+    pub(crate) fn with(&self, scene: Scene) -> Result<Self, Error> {
         let problems = scene.problems();
         if problems.is_empty() {
             Ok(self.changed(scene))
@@ -103,7 +103,7 @@ impl SceneFile {
     ///
     /// # Errors
     /// What is not allowed in still air; a checked scene gives none.
-    pub(crate) fn in_still_air(&self) -> Result<Self, SceneError> {
+    pub(crate) fn in_still_air(&self) -> Result<Self, Error> {
         let mut scene = self.content.clone();
         (scene.flow, scene.added_flows, scene.retrieval) = (super::Flow::Calm {}, Vec::new(), None);
         scene.outputs.signals = false;
@@ -115,7 +115,7 @@ impl SceneFile {
     ///
     /// # Errors
     /// As [`Self::in_still_air`].
-    pub(crate) fn of_one_scan_in_still_air(&self) -> Result<Self, SceneError> {
+    pub(crate) fn of_one_scan_in_still_air(&self) -> Result<Self, Error> {
         let still = self.in_still_air()?;
         let mut scene = still.content.clone();
         scene.scan.head.sweeps = 1;
@@ -144,7 +144,7 @@ impl SceneFile {
                 Problem::new(key, refused.value, refused.allowed)
             }
         };
-        self.located(vec![problem]).into()
+        self.located(vec![problem])
     }
 }
 

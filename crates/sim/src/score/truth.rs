@@ -5,7 +5,6 @@
 use super::Quantity;
 use crate::Error;
 use crate::io::data_set::{DataSet, Split};
-use ndarray::ArrayD;
 use std::path::Path;
 use wakescope_estimate::retrieval::Side;
 
@@ -86,72 +85,6 @@ pub struct Truth {
     pub scans_per_flight: usize,
 }
 
-/// The truth of each flight, \[flight, other axes..\].
-struct Arrays {
-    site: ArrayD<f64>,
-    snr_db: ArrayD<f64>,
-    dissipation_m2_s3: ArrayD<f64>,
-    spacing_m: ArrayD<f64>,
-    age_tau: ArrayD<f64>,
-    y_m: ArrayD<f64>,
-    z_m: ArrayD<f64>,
-    gamma_5_15_m2_s: ArrayD<f64>,
-    in_view: ArrayD<f64>,
-}
-
-impl Arrays {
-    fn read(data_set: &DataSet) -> Result<Self, Error> {
-        let read = |name: &str| data_set.values(name, 0..data_set.splits.len());
-        Ok(Self {
-            site: read("site")?,
-            snr_db: read("snr_middle")?,
-            dissipation_m2_s3: read("dissipation")?,
-            spacing_m: read("spacing")?,
-            age_tau: read("wake_age")?,
-            y_m: read("vortex_y")?,
-            z_m: read("vortex_z")?,
-            gamma_5_15_m2_s: read("circulation_5_15")?,
-            in_view: read("in_view")?,
-        })
-    }
-
-    fn flight(&self, flight: usize, split: Split) -> TrueFlight {
-        let scans = 0..self.age_tau.shape()[1];
-        TrueFlight {
-            split,
-            site: self.site[[flight]] as usize,
-            snr_db: self.snr_db[[flight]],
-            dissipation_m2_s3: self.dissipation_m2_s3[[flight]],
-            spacing_m: self.spacing_m[[flight]],
-            scans: scans.map(|scan| self.scan(flight, scan)).collect(),
-        }
-    }
-
-    fn scan(&self, flight: usize, scan: usize) -> TrueScan {
-        let mut vortices = Vec::new();
-        for (index, side) in Side::BOTH.into_iter().enumerate() {
-            let at = [flight, scan, index];
-            let values = VortexValues {
-                y_m: self.y_m[at],
-                z_m: self.z_m[at],
-                gamma_5_15_m2_s: self.gamma_5_15_m2_s[at],
-            };
-            // Where there is none, its place is missing.
-            if !values.y_m.is_nan() {
-                vortices.push(TrueVortex {
-                    side,
-                    values,
-                    is_in_view: self.in_view[at] == 1.0,
-                });
-            }
-        }
-        TrueScan {
-            age_tau: self.age_tau[[flight, scan]],
-            vortices,
-        }
-    }
-}
-
 impl Truth {
     /// Reads the truth of a data set.
     ///
@@ -159,10 +92,22 @@ impl Truth {
     /// Arrays that are missing; chunks of ready flights that are missing or damaged, with their path.
     pub fn read(folder: &Path) -> Result<(Self, DataSet), Error> {
         let data_set = DataSet::open(folder)?;
-        let arrays = Arrays::read(&data_set)?;
         let mut flights = Vec::with_capacity(data_set.splits.len());
-        for (flight, split) in data_set.splits.iter().enumerate() {
-            flights.push(split.map(|split| arrays.flight(flight, split)));
+        let read = |name: &str| data_set.values(name, 0..data_set.splits.len());
+        let site = read("site")?;
+        let snr_db = read("snr_middle")?;
+        let dissipation_m2_s3 = read("dissipation")?;
+        let spacing_m = read("spacing")?;
+        let scans = scans(&data_set)?;
+        for ((flight, split), scans) in data_set.splits.iter().enumerate().zip(scans) {
+            flights.push(split.map(|split| TrueFlight {
+                split,
+                site: site[[flight]] as usize,
+                snr_db: snr_db[[flight]],
+                dissipation_m2_s3: dissipation_m2_s3[[flight]],
+                spacing_m: spacing_m[[flight]],
+                scans,
+            }));
         }
         let truth = Self {
             flights,
@@ -192,4 +137,43 @@ impl Truth {
         }
         sum / count
     }
+}
+
+/// The scans of each flight.
+fn scans(data_set: &DataSet) -> Result<Vec<Vec<TrueScan>>, Error> {
+    let read = |name: &str| data_set.values(name, 0..data_set.splits.len());
+    let age_tau = read("wake_age")?;
+    let y_m = read("vortex_y")?;
+    let z_m = read("vortex_z")?;
+    let gamma_5_15_m2_s = read("circulation_5_15")?;
+    let in_view = read("in_view")?;
+    let mut flights = Vec::with_capacity(data_set.splits.len());
+    for flight in 0..data_set.splits.len() {
+        let mut scans = Vec::with_capacity(data_set.scans_per_flight);
+        for scan in 0..data_set.scans_per_flight {
+            let mut vortices = Vec::new();
+            for (index, side) in Side::BOTH.into_iter().enumerate() {
+                let at = [flight, scan, index];
+                let values = VortexValues {
+                    y_m: y_m[at],
+                    z_m: z_m[at],
+                    gamma_5_15_m2_s: gamma_5_15_m2_s[at],
+                };
+                // Where there is none, its place is missing.
+                if !values.y_m.is_nan() {
+                    vortices.push(TrueVortex {
+                        side,
+                        values,
+                        is_in_view: in_view[at] == 1.0,
+                    });
+                }
+            }
+            scans.push(TrueScan {
+                age_tau: age_tau[[flight, scan]],
+                vortices,
+            });
+        }
+        flights.push(scans);
+    }
+    Ok(flights)
 }

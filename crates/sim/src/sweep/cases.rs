@@ -8,7 +8,7 @@ use super::key_path::{SceneKey, VaryingKey, resolve};
 use crate::Error;
 use crate::io::csv_input::TextTable;
 use crate::io::{Provenance, csv::float_text};
-use crate::keys::{Kind, Problem, SceneError, to_table, value_at};
+use crate::keys::{Kind, Problem, to_table, value_at};
 use crate::scene::{Scene, SceneFile, hash_of};
 use crate::streams::stream;
 use rand_xoshiro::rand_core::Rng;
@@ -70,12 +70,12 @@ impl Sweep {
     /// Keys, values and expressions that cannot be; more than [`MOST_CASES`]; no case; the first case whose scene is refused.
     pub fn parse(text: &str, path: &Path, request: &Request) -> Result<Self, Error> {
         let base = toml::from_str::<Table>(text).map_err(|e| {
-            let malformed = SceneError::Malformed {
+            let malformed = Error::Malformed {
                 path: path.to_owned(),
                 line: 1,
                 message: e.message().into(),
             };
-            scene_error(text, path, malformed.into())
+            scene_error(text, path, malformed)
         })?;
         let grid = Grid::new(path, base, request)?;
         let cases = grid
@@ -121,7 +121,7 @@ impl Sweep {
 fn scene_error(text: &str, path: &Path, other: Error) -> Error {
     match SceneFile::parse(text, path) {
         Ok(_) => other,
-        Err(error) => error.into(),
+        Err(error) => error,
     }
 }
 
@@ -135,7 +135,7 @@ fn described<'a>(names: impl Iterator<Item = &'a str>, values: &[String]) -> Str
 
 /// An error of a case; the lines of its text are no lines of a file.
 fn failed(case: usize, keys: String, others: usize, mut error: Error) -> Error {
-    if let Error::Scene(SceneError::Invalid { problems, .. }) = &mut error {
+    if let Error::Invalid { problems, .. } = &mut error {
         for problem in problems {
             problem.line = None;
         }
@@ -150,11 +150,10 @@ fn failed(case: usize, keys: String, others: usize, mut error: Error) -> Error {
 
 /// A refusal of a word of the command line.
 fn refused(word: &str, problem: Problem) -> Error {
-    SceneError::Invalid {
+    Error::Invalid {
         path: word.into(),
         problems: vec![problem],
     }
-    .into()
 }
 
 /// Keys that vary together, and their values, a row for each combination.

@@ -6,7 +6,7 @@ use super::cases::{Case, Sweep};
 use super::results::rows;
 use super::stored::{Definition, case_files};
 use super::tables;
-use crate::io::{Existing, OutputError, Table};
+use crate::io::{Existing, Table};
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::profile::EfficiencyMemo;
 use crate::measure::recorded::PredictedError;
@@ -163,7 +163,7 @@ pub fn run(
 /// An error of the preparation of the folder; of a file of an earlier run of this sweep, with what to do.
 fn in_the_way(error: Error, is_of_this_sweep: bool) -> Error {
     match error {
-        Error::Export(OutputError::Exists { path }) if is_of_this_sweep => Error::input(
+        Error::Exists { path } if is_of_this_sweep => Error::input(
             &path,
             "it is of an earlier run of this sweep: --resume runs the cases without a result, --overwrite runs all anew",
         ),

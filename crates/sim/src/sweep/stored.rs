@@ -123,10 +123,7 @@ impl Definition {
             return Ok(());
         }
         std::fs::create_dir_all(folder).map_err(Error::io("make the folder", folder))?;
-        Ok(write_atomic(
-            &folder.join(SWEEP),
-            format!("{:#}\n", json!(self)),
-        )?)
+        write_atomic(&folder.join(SWEEP), format!("{:#}\n", json!(self)))
     }
 
     pub(super) fn read(folder: &Path) -> Result<Self, Error> {

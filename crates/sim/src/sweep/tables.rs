@@ -174,7 +174,7 @@ fn netcdf(definition: &Definition, rows: &[CaseResult]) -> Result<Vec<u8>, Error
     }
     let dims = vec![("case", rows.len()), ("string_length", width)];
     let origin = &definition.origin();
-    Ok(Layout::cf("Results of a sweep over scenes", dims, variables, origin).into_bytes(origin)?)
+    Layout::cf("Results of a sweep over scenes", dims, variables, origin).into_bytes(origin)
 }
 
 /// The bytes of a text of a fixed width. What is not used is NUL: blanks stay in the texts of readers.

@@ -5,8 +5,9 @@
 use super::WindProfiles;
 use super::rows::WindRow;
 use super::table::date;
+use crate::Error;
+use crate::io::Provenance;
 use crate::io::netcdf::{Data, Layout, described};
-use crate::io::{OutputResult, Provenance};
 use std::collections::BTreeMap;
 
 /// Heights that are closer than this are one, m.
@@ -39,7 +40,7 @@ const FIELDS: [Field; 16] = [
 ///
 /// # Errors
 /// A result too large for one file.
-pub fn netcdf(profiles: &WindProfiles, origin: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn netcdf(profiles: &WindProfiles, origin: &Provenance) -> Result<Vec<u8>, Error> {
     let rows = &profiles.rows;
     let mut heights: BTreeMap<i64, f64> = BTreeMap::new();
     for row in rows {

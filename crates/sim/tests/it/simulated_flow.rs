@@ -65,7 +65,7 @@ fn flow(folder: &Path) {
 fn plan(folder: &Path, more: &str, scan: &str) -> Result<Plan, Error> {
     let text = SCENE.replace("MORE", more).replace("SCAN", scan);
     Plan::new(
-        SceneFile::parse(&text, &folder.join("scene.toml")).map_err(Error::Scene)?,
+        SceneFile::parse(&text, &folder.join("scene.toml"))?,
         Target::Map,
     )
 }

@@ -15,7 +15,7 @@ use crate::vortex_fit::top::mixed;
 use crate::vortex_fit::wake::free_parameters::spread;
 use crate::vortex_fit::{
     FreeParameters, Parameter, Powers, ScanModel, ScanSetup, ScanSignals, Sharing,
-    SignalFitOptions, Starts, Top, Wake,
+    SignalFitOptions, Top, Wake,
 };
 use crate::window::Sample;
 
@@ -98,7 +98,7 @@ pub fn fit_signals<S: Sample>(
     options: &SignalFitOptions,
 ) -> Result<SignalFit, Error> {
     let mut start = options.free.start(guess);
-    if options.starts == Starts::Several && options.free.core_radius != Sharing::Fixed {
+    if options.several_starts && options.free.core_radius != Sharing::Fixed {
         // wide cores have few maxima
         start = start.with_cores(FIRST_CORE_OVER_SPACING * start.spacing_m());
     }
@@ -111,7 +111,7 @@ pub fn fit_signals<S: Sample>(
         options,
     };
     let mut tops = vec![search.settle((start, Powers::default()), true)?];
-    if options.starts == Starts::Several {
+    if options.several_starts {
         for (state, gain) in search.others(&tops[0])? {
             let settled = match gain {
                 None => search.settle(state, false),

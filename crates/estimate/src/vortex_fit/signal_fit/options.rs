@@ -17,17 +17,9 @@ pub struct SignalFitOptions {
     pub max_iterations: usize,
     /// The fit ends when the remaining step is below this fraction of the standard deviations.
     pub tolerance_sigmas: f64,
-    /// Starts of the fit.
-    pub starts: Starts,
-}
-
-/// Starts of a fit of signals.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Starts {
-    /// The guess alone: which maximum is found depends on it.
-    Guess,
-    /// The guess, then core radii from 1.5 to 12 % of the spacing and heights about the first maximum.
-    Several,
+    /// Whether other starts follow the guess: core radii from 1.5 to 12 % of the spacing and heights about the first maximum. From
+    /// the guess alone, which maximum is found depends on it.
+    pub several_starts: bool,
 }
 
 impl Default for SignalFitOptions {
@@ -40,7 +32,7 @@ impl Default for SignalFitOptions {
             information_stride: 4,
             max_iterations: 60,
             tolerance_sigmas: 1e-2,
-            starts: Starts::Several,
+            several_starts: true,
         }
     }
 }

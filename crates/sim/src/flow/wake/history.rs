@@ -363,16 +363,13 @@ impl WakeRun {
         folder: &Path,
         origin: &Provenance,
     ) -> Result<(), Error> {
-        Ok(write_atomic(
-            &folder.join(TABLE),
-            self.table().to_csv(origin)?,
-        )?)
+        write_atomic(&folder.join(TABLE), self.table().to_csv(origin)?)
     }
 
     /// Writes all files of the whole history.
     pub(in super::super) fn finish(&self, folder: &Path, origin: &Provenance) -> Result<(), Error> {
         self.write_table(folder, origin)?;
-        Ok(write_atomic(&folder.join(NETCDF), self.netcdf(origin)?)?)
+        write_atomic(&folder.join(NETCDF), self.netcdf(origin)?)
     }
 
     /// All columns of the table and all lists over their axes, in SI units.
@@ -404,7 +401,7 @@ impl WakeRun {
         ] {
             layout.globals.push((name, format!("{value:?}")));
         }
-        Ok(layout.into_bytes(origin)?)
+        layout.into_bytes(origin)
     }
 
     /// Axes of the lists, with the times beside the ages.

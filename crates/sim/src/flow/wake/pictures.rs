@@ -118,7 +118,7 @@ impl FinishedWake {
         {
             group.add("plane1.apng", apng(&frames, FRAME_S, &origin)?)?;
         }
-        Ok(group.commit()?)
+        group.commit()
     }
 
     /// Surfaces where the vorticity, over `Gamma0/b0^2`, is 1 and 10, at the ages of the fields; none without fields as NetCDF.

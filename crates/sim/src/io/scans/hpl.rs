@@ -31,17 +31,12 @@ struct Header {
     second_of_day: Option<f64>,
     /// What its date is, if it is none.
     not_understood: Option<String>,
+    /// Whether this program wrote it.
+    is_own: bool,
 }
 
-/// What a text holds before its rays are put into scans.
-struct Parsed<'t> {
-    head: Vec<&'t str>,
-    header: Header,
-    rays: Vec<RayRow>,
-    range_m: Vec<f64>,
-}
-
-fn parse<'t>(text: &'t str, format: &ScanFormat) -> Result<Parsed<'t>, String> {
+/// The header of a text and its rays, before they are put into scans.
+fn parse(text: &str, format: &ScanFormat) -> Result<(Header, Vec<RayRow>), String> {
     let mut lines = text.lines().enumerate();
     let mut head = Vec::new();
     for (_, line) in lines.by_ref() {
@@ -61,16 +56,7 @@ fn parse<'t>(text: &'t str, format: &ScanFormat) -> Result<Parsed<'t>, String> {
         ));
     }
     mask_noise(&mut rays, &intensities, format);
-    let mut range_m = Vec::with_capacity(header.gates);
-    for gate in 0..header.gates {
-        range_m.push(0.5 * header.gate_length_m + gate as f64 * header.gate_step_m);
-    }
-    Ok(Parsed {
-        head,
-        header,
-        rays,
-        range_m,
-    })
+    Ok((header, rays))
 }
 
 /// The rays of a text.
@@ -79,12 +65,8 @@ pub(super) fn rays_of_text(
     path: &Path,
     format: &ScanFormat,
 ) -> Result<FoundRays, String> {
-    let Parsed {
-        header,
-        rays: rows,
-        range_m,
-        ..
-    } = parse(text, format)?;
+    let (header, rows) = parse(text, format)?;
+    let range_m = header.range_m();
     let mut rays = Vec::with_capacity(rows.len());
     for row in rows {
         rays.push(Ray {
@@ -110,12 +92,8 @@ pub(super) fn rays_of_text(
 
 /// The scans of a text.
 pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Found, String> {
-    let Parsed {
-        head,
-        header,
-        rays,
-        range_m,
-    } = parse(text, format)?;
+    let (header, rays) = parse(text, format)?;
+    let range_m = header.range_m();
     let (scans, skipped) = planes::in_order(rays)?;
     let mut found = Found {
         skipped,
@@ -129,7 +107,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
                 azimuth_rad: scan.azimuth_rad,
                 reference: header.midnight,
                 gate_length_m: Some(header.gate_length_m),
-                is_own: head.contains(&crate::io::hpl::SYSTEM_ID),
+                is_own: header.is_own,
                 ..ReadScan::new(path, sweep, map)
             }),
         }
@@ -244,7 +222,17 @@ impl Header {
             not_understood: stated
                 .filter(|_| start.is_none())
                 .map(|text| not_understood("Start time", text)),
+            is_own: lines.contains(&crate::io::hpl::SYSTEM_ID),
         })
+    }
+
+    /// Ranges of the gates.
+    fn range_m(&self) -> Vec<f64> {
+        let mut range_m = Vec::with_capacity(self.gates);
+        for gate in 0..self.gates {
+            range_m.push(0.5 * self.gate_length_m + gate as f64 * self.gate_step_m);
+        }
+        range_m
     }
 }
 

@@ -160,7 +160,7 @@ fn mirrored(scene: SceneFile) -> Result<SceneFile, Error> {
     let detector = &mut content.detector;
     detector.intermediate_frequency_hz =
         0.5 * detector.sampling_hz - detector.intermediate_frequency_hz;
-    Ok(scene.with(content)?)
+    scene.with(content)
 }
 
 /// A scene without what is done with its signals.

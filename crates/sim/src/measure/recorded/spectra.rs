@@ -4,7 +4,7 @@
 
 use super::lines::ScanLines;
 use crate::Error;
-use crate::io::{OutputError, Spectra};
+use crate::io::Spectra;
 use crate::measure::map_estimator::{MapEstimator, windows_at};
 use crate::plan::Plan;
 use ndarray::ArrayView2;
@@ -155,7 +155,7 @@ impl GateSpectra {
                 "--spectra makes {bytes} bytes, at most {MOST_BYTES}: larger estimator.gate_step_samples or smaller \
                  estimator.padded_samples make fewer"
             );
-            return Err(OutputError::unsupported("spectra.nc", reason).into());
+            return Err(Error::unsupported("spectra.nc", reason));
         }
         Ok(())
     }

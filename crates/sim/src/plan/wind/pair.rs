@@ -24,14 +24,9 @@ const FITTED_AFTER_BIRTH_TAU: f64 = 4.0;
 pub(crate) struct ScenePair {
     /// The pair at its release.
     released: les::VortexPair,
-    transported: Option<Transported>,
-}
-
-/// The path of a pair that decays.
-#[derive(Clone)]
-struct Transported {
-    path: Arc<TransportedPair>,
-    transport: Transport,
+    /// Its path, if it decays.
+    path: Option<Arc<TransportedPair>>,
+    /// Turbulence in its units, of one that decays.
     eps_star: f64,
 }
 
@@ -45,7 +40,8 @@ impl ScenePair {
         if !pair.is_transported() {
             return Ok(Self {
                 released,
-                transported: None,
+                path: None,
+                eps_star: 0.0,
             });
         }
         let t0_s = released.time_s(1.0);
@@ -74,11 +70,8 @@ impl ScenePair {
         let path = TransportedPair::new(released, transport, Some(&carrier), eddies, OLDEST_TAU)?;
         Ok(Self {
             released,
-            transported: Some(Transported {
-                path: Arc::new(path),
-                transport,
-                eps_star,
-            }),
+            path: Some(Arc::new(path)),
+            eps_star,
         })
     }
 
@@ -87,8 +80,8 @@ impl ScenePair {
     /// # Errors
     /// What the wind refuses; a checked scene gives none.
     pub(super) fn wind(&self, pair: &VortexPair) -> Result<Box<dyn Wind>, Error> {
-        let of_age: Arc<dyn Wind> = match &self.transported {
-            Some(transported) => transported.path.clone(),
+        let of_age: Arc<dyn Wind> = match &self.path {
+            Some(path) => path.clone(),
             None => Arc::new(self.released.wind()?),
         };
         Ok(match pair.aircraft {
@@ -102,31 +95,31 @@ impl ScenePair {
     /// # Errors
     /// An age beyond the path of the pair.
     pub(crate) fn vortices(&self, age_s: f64) -> Result<[Vortex; 2], Error> {
-        match &self.transported {
-            Some(transported) => Ok(transported.path.primary_vortices(age_s.max(0.0))?),
+        match &self.path {
+            Some(path) => Ok(path.primary_vortices(age_s.max(0.0))?),
             None => Ok(self.released.vortices(age_s)),
         }
     }
 
     /// The last age that is known, s; infinite for a pair that does not decay.
     pub(crate) fn last_age_s(&self) -> f64 {
-        let last_s = |transported: &Transported| transported.path.last_time_s();
-        self.transported.as_ref().map_or(f64::INFINITY, last_s)
+        self.path
+            .as_ref()
+            .map_or(f64::INFINITY, |path| path.last_time_s())
     }
 
     /// What the plan prints of a pair that decays, whose age is at most `age_s` in the scan: its lifetime, and its descent
     /// beside the final one of Holzaepfel (2003).
     pub(crate) fn description(&self, age_s: f64) -> Option<String> {
-        let transported = self.transported.as_ref()?;
+        let transport = self.path.as_ref()?.transport();
         let [left, right] = self.vortices(age_s).ok()?;
         let start_m2_s = self.released.circulation_m2_s;
         let left_over = 0.5 * (right.circulation_m2_s - left.circulation_m2_s) / start_m2_s;
         let descent_m = self.released.height_m - 0.5 * (left.height_m + right.height_m);
-        let n_star = transported.transport.n_star;
-        let final_b0 = decay::holzaepfel_final_descent(transported.eps_star, n_star);
+        let final_b0 = decay::holzaepfel_final_descent(self.eps_star, transport.n_star);
         let mut text = format!(
             "lifetime {:.2} tau; at the end of the scan {:.0} % of the circulation, {:.0} m {} the release",
-            transported.transport.lifetime_tau,
+            transport.lifetime_tau,
             100.0 * left_over,
             descent_m.abs(),
             if descent_m < 0.0 { "above" } else { "below" },
@@ -142,7 +135,7 @@ impl ScenePair {
 
     /// Ages of a pair that decays for which its laws were not fitted.
     pub(crate) fn warnings(&self, age_s: f64) -> Vec<String> {
-        let Some(transported) = &self.transported else {
+        let Some(path) = &self.path else {
             return Vec::new();
         };
         let mut out = Vec::new();
@@ -153,7 +146,7 @@ impl ScenePair {
                 "the vortex pair becomes {age_tau:.1} tau old: its decay is known to {FITTED_TAU} tau"
             ));
         }
-        let [left_s, right_s] = transported.path.birth_s();
+        let [left_s, right_s] = path.birth_s();
         let after_birth_tau = (age_s - left_s.min(right_s)) / t0_s;
         if after_birth_tau > FITTED_AFTER_BIRTH_TAU {
             out.push(format!(

@@ -4,10 +4,6 @@
 //! standard error that covers however few they are. The squared error alone hides that inside a vortex it is mostly bias. Moments up to the
 //! fourth are updated in one pass (Pebay 2008). Check: against two-pass formulas on skewed data.
 
-use ndarray::{Array, ArrayView, Dimension, Zip};
-
-use crate::error::Error;
-
 /// Realisations that the moments of Gaussian errors count as.
 const GAUSSIAN: f64 = 4.0;
 
@@ -123,7 +119,8 @@ pub struct ErrorStatistics {
 }
 
 impl ErrorStatistics {
-    /// Of the errors at one point.
+    /// Of the errors of realisations at one point; what is not finite, such as an estimate that should not count, is missing. The
+    /// same bits in the same order; another order changes only the rounding.
     #[must_use]
     pub fn of(errors_m_s: impl IntoIterator<Item = f64>) -> Self {
         let mut moments = Moments::default();
@@ -132,74 +129,17 @@ impl ErrorStatistics {
     }
 }
 
-/// Accumulates errors over realisations, point by point, for arrays of any dimension.
-///
-/// Add realisations in a fixed order for the same bits; another order changes only the rounding.
-#[derive(Debug, Clone)]
-pub struct ErrorMap<D: Dimension> {
-    moments: Array<Moments, D>,
-}
-
-impl<D: Dimension> ErrorMap<D> {
-    /// An empty accumulator for maps of the given shape.
-    #[must_use]
-    pub fn new(shape: D) -> Self {
-        Self {
-            moments: Array::default(shape),
-        }
-    }
-
-    /// Adds one realisation: estimates and truth \[m/s\], of the shape of the map.
-    ///
-    /// An estimate that should not count (a flag other than good) goes in as NaN and is counted as missing.
-    ///
-    /// # Errors
-    /// [`Error::Length`] if a shape differs.
-    pub fn add(
-        &mut self,
-        estimate_m_s: ArrayView<'_, f64, D>,
-        truth_m_s: ArrayView<'_, f64, D>,
-    ) -> Result<(), Error> {
-        for (field, view) in [("estimate_m_s", &estimate_m_s), ("truth_m_s", &truth_m_s)] {
-            if view.raw_dim() != self.moments.raw_dim() {
-                return Err(Error::Length {
-                    field,
-                    expected: self.moments.len(),
-                    found: view.len(),
-                });
-            }
-        }
-        Zip::from(&mut self.moments)
-            .and(&estimate_m_s)
-            .and(&truth_m_s)
-            .for_each(|moments, estimate, truth| moments.add(estimate - truth));
-        Ok(())
-    }
-
-    /// The statistics at every point.
-    #[must_use]
-    pub fn statistics(&self) -> Array<ErrorStatistics, D> {
-        self.moments.map(Moments::statistics)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
-    use ndarray::{Array1, Array2, Ix1, array};
 
     #[test]
     fn one_pass_moments_agree_with_two_passes_on_skewed_data() {
         let errors: Vec<f64> = (0..200)
             .map(|i| 2.0 + (i as f64 * 0.37).sin().powi(3).exp())
             .collect();
-        let mut map = ErrorMap::new(Ix1(1));
-        for error in &errors {
-            map.add(array![error + 5.0].view(), array![5.0].view())
-                .unwrap();
-        }
-        let found = map.statistics()[0];
+        let found = ErrorStatistics::of(errors.iter().copied());
         let n = errors.len() as f64;
         let bias = errors.iter().sum::<f64>() / n;
         let moment = |p: i32| errors.iter().map(|e| (e - bias).powi(p)).sum::<f64>() / n;
@@ -305,15 +245,8 @@ mod tests {
         let errors: Vec<f64> = (0..500)
             .map(|i| (i as f64 * 1.7).sin() * 3.0 + 0.2)
             .collect();
-        let run = |order: &mut dyn Iterator<Item = &f64>| {
-            let mut map = ErrorMap::new(Ix1(1));
-            for error in order {
-                map.add(array![*error].view(), array![0.0].view()).unwrap();
-            }
-            map.statistics()[0]
-        };
-        let forward = run(&mut errors.iter());
-        let backward = run(&mut errors.iter().rev());
+        let forward = ErrorStatistics::of(errors.iter().copied());
+        let backward = ErrorStatistics::of(errors.iter().rev().copied());
         assert_relative_eq!(
             forward.bias_m_s,
             backward.bias_m_s,
@@ -326,26 +259,12 @@ mod tests {
 
     #[test]
     fn missing_estimates_are_counted_and_left_out() {
-        let mut map = ErrorMap::new(ndarray::Ix2(1, 2));
-        let truth = Array2::zeros((1, 2));
-        map.add(array![[1.0, f64::NAN]].view(), truth.view())
-            .unwrap();
-        map.add(array![[3.0, f64::NAN]].view(), truth.view())
-            .unwrap();
-        let found = map.statistics();
-        assert_eq!((found[[0, 0]].count, found[[0, 0]].missing), (2, 0));
-        assert_relative_eq!(found[[0, 0]].bias_m_s, 2.0);
-        assert_relative_eq!(found[[0, 0]].std_m_s, 2.0_f64.sqrt());
-        assert_eq!((found[[0, 1]].count, found[[0, 1]].missing), (0, 2));
-        assert!(found[[0, 1]].bias_m_s.is_nan() && found[[0, 1]].rms_m_s.is_nan());
-    }
-
-    #[test]
-    fn shapes_must_agree() {
-        let mut map = ErrorMap::new(Ix1(3));
-        let short = Array1::zeros(2);
-        let right = Array1::zeros(3);
-        assert!(map.add(short.view(), right.view()).is_err());
-        assert!(map.add(right.view(), short.view()).is_err());
+        let found = ErrorStatistics::of([1.0, f64::NAN, 3.0, f64::INFINITY]);
+        assert_eq!((found.count, found.missing), (2, 2));
+        assert_relative_eq!(found.bias_m_s, 2.0);
+        assert_relative_eq!(found.std_m_s, 2.0_f64.sqrt());
+        let none = ErrorStatistics::of([f64::NAN; 2]);
+        assert_eq!((none.count, none.missing), (0, 2));
+        assert!(none.bias_m_s.is_nan() && none.rms_m_s.is_nan());
     }
 }
