@@ -8,8 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_estimate::vortex_fit::{
     CoreProfile, EstimatorResponse, FreeParameters, Loss, MapFit, MapFitOptions, Parameter, Powers,
-    RangeKernel, ScanModel, ScanSetup, Sharing, SignalFitOptions, Starts, VelocityMap, Wake,
-    WakeModel, WindFit, fit_map, fit_map_of_estimator, fit_signals,
+    RangeKernel, ScanModel, ScanSetup, Sharing, SignalFitOptions, VelocityMap, Wake, WakeModel,
+    WindFit, fit_map, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
     Correlogram, Error, Refinement, Sampling, SignalKind, SpectralPeak, Weighting, bound::Noise,
@@ -522,19 +522,19 @@ fn several_starts_find_a_higher_top_than_the_usual_core_alone() {
         snr,
         &mut Xoshiro256PlusPlus::seed_from_u64(0),
     );
-    let fit = |guess: Wake, starts| {
-        let options = SignalFitOptions {
-            free,
-            starts,
-            ..Default::default()
-        };
-        fit_signals(&setup, |_, _| snr, records.view(), 1.0, &guess, &options).unwrap()
+    let several = SignalFitOptions {
+        free,
+        ..Default::default()
     };
-    let (usual_m, at_truth) = (0.045 * 40.0, fit(pair(3.0), Starts::Guess));
-    let (single, several) = (
-        fit(pair(usual_m), Starts::Guess),
-        fit(pair(usual_m), Starts::Several),
-    );
+    let alone = SignalFitOptions {
+        several_starts: false,
+        ..several
+    };
+    let fit = |guess: Wake, options: &SignalFitOptions| {
+        fit_signals(&setup, |_, _| snr, records.view(), 1.0, &guess, options).unwrap()
+    };
+    let (usual_m, at_truth) = (0.045 * 40.0, fit(pair(3.0), &alone));
+    let (single, several) = (fit(pair(usual_m), &alone), fit(pair(usual_m), &several));
     let (single_m, several_m) = (
         single.wake.left.core_radius_m,
         several.wake.left.core_radius_m,
