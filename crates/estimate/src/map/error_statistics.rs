@@ -7,74 +7,22 @@
 /// Realisations that the moments of Gaussian errors count as.
 const GAUSSIAN: f64 = 4.0;
 
-/// Running moments of the error at one point.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Moments {
-    count: f64,
-    missing: usize,
-    mean: f64,
-    m2: f64,
-    m3: f64,
-    m4: f64,
-}
-
-impl Moments {
-    fn add(&mut self, error: f64) {
-        if !error.is_finite() {
-            self.missing += 1;
-            return;
-        }
-        let before = self.count;
-        self.count += 1.0;
-        let n = self.count;
-        let delta = error - self.mean;
+/// Mean of the errors and sums of the powers 2, 3 and 4 of their deviations from it.
+fn moments(errors: &[f64]) -> [f64; 4] {
+    let [mut mean, mut m2, mut m3, mut m4] = [0.0; 4];
+    for (before, error) in errors.iter().enumerate() {
+        let before = before as f64;
+        let n = before + 1.0;
+        let delta = error - mean;
         let step = delta / n;
         let step2 = step * step;
         let term = delta * step * before;
-        self.mean += step;
-        self.m4 +=
-            term * step2 * (n * n - 3.0 * n + 3.0) + 6.0 * step2 * self.m2 - 4.0 * step * self.m3;
-        self.m3 += term * step * (n - 2.0) - 3.0 * step * self.m2;
-        self.m2 += term;
+        mean += step;
+        m4 += term * step2 * (n * n - 3.0 * n + 3.0) + 6.0 * step2 * m2 - 4.0 * step * m3;
+        m3 += term * step * (n - 2.0) - 3.0 * step * m2;
+        m2 += term;
     }
-
-    fn statistics(&self) -> ErrorStatistics {
-        let n = self.count;
-        let variance = self.m2 / (n - 1.0);
-        let std_m_s = value_if(n > 1.5, variance.sqrt());
-        // central moments in population form
-        let c2 = self.m2 / n;
-        let c3 = self.m3 / n;
-        let c4 = self.m4 / n;
-        let bias_m_s = value_if(n > 0.5, self.mean);
-        let rms_m_s = (bias_m_s * bias_m_s + c2).sqrt();
-        let fourth = variance * variance * (n - 1.0) / (n + 1.0);
-        let squared_bias = (bias_m_s * bias_m_s - variance / n).max(0.0);
-        let of_variance = ((c4 - c2 * c2 * (n - 3.0) / (n - 1.0)) / n).max(0.0);
-        let of_variance = with_gaussian(n, of_variance, 2.0 * fourth / (n - 1.0));
-        let of_squares = (c4 + 4.0 * bias_m_s * c3 + 4.0 * bias_m_s * bias_m_s * c2 - c2 * c2)
-            .max(0.0)
-            / (n - 1.0);
-        let of_squares = with_gaussian(
-            n,
-            of_squares,
-            (2.0 * fourth + 4.0 * squared_bias * variance) / n,
-        );
-        // About Student's factor for one and for two standard errors.
-        let student = 1.0 + 0.75 / (n - 1.0);
-        let std_error_m_s = root_error(student, of_variance, std_m_s);
-        let rms_error_m_s = root_error(student, of_squares, rms_m_s);
-        ErrorStatistics {
-            count: n as usize,
-            missing: self.missing,
-            bias_m_s,
-            bias_standard_error_m_s: value_if(n > 1.5, student * (variance / n).sqrt()),
-            std_m_s,
-            std_standard_error_m_s: value_if(n > 1.5, std_error_m_s),
-            rms_m_s,
-            rms_standard_error_m_s: value_if(n > 1.5, rms_error_m_s),
-        }
-    }
+    [mean, m2, m3, m4]
 }
 
 /// The value if there are enough numbers, else NaN.
@@ -123,9 +71,51 @@ impl ErrorStatistics {
     /// same bits in the same order; another order changes only the rounding.
     #[must_use]
     pub fn of(errors_m_s: impl IntoIterator<Item = f64>) -> Self {
-        let mut moments = Moments::default();
-        errors_m_s.into_iter().for_each(|error| moments.add(error));
-        moments.statistics()
+        let mut known = Vec::new();
+        let mut missing = 0;
+        for error_m_s in errors_m_s {
+            if error_m_s.is_finite() {
+                known.push(error_m_s);
+            } else {
+                missing += 1;
+            }
+        }
+        let n = known.len() as f64;
+        let [mean, m2, m3, m4] = moments(&known);
+        let variance = m2 / (n - 1.0);
+        let std_m_s = value_if(n > 1.5, variance.sqrt());
+        // central moments in population form
+        let c2 = m2 / n;
+        let c3 = m3 / n;
+        let c4 = m4 / n;
+        let bias_m_s = value_if(n > 0.5, mean);
+        let rms_m_s = (bias_m_s * bias_m_s + c2).sqrt();
+        let fourth = variance * variance * (n - 1.0) / (n + 1.0);
+        let squared_bias = (bias_m_s * bias_m_s - variance / n).max(0.0);
+        let of_variance = ((c4 - c2 * c2 * (n - 3.0) / (n - 1.0)) / n).max(0.0);
+        let of_variance = with_gaussian(n, of_variance, 2.0 * fourth / (n - 1.0));
+        let of_squares = (c4 + 4.0 * bias_m_s * c3 + 4.0 * bias_m_s * bias_m_s * c2 - c2 * c2)
+            .max(0.0)
+            / (n - 1.0);
+        let of_squares = with_gaussian(
+            n,
+            of_squares,
+            (2.0 * fourth + 4.0 * squared_bias * variance) / n,
+        );
+        // About Student's factor for one and for two standard errors.
+        let student = 1.0 + 0.75 / (n - 1.0);
+        let std_error_m_s = root_error(student, of_variance, std_m_s);
+        let rms_error_m_s = root_error(student, of_squares, rms_m_s);
+        Self {
+            count: n as usize,
+            missing,
+            bias_m_s,
+            bias_standard_error_m_s: value_if(n > 1.5, student * (variance / n).sqrt()),
+            std_m_s,
+            std_standard_error_m_s: value_if(n > 1.5, std_error_m_s),
+            rms_m_s,
+            rms_standard_error_m_s: value_if(n > 1.5, rms_error_m_s),
+        }
     }
 }
 

@@ -2,10 +2,12 @@
 //!
 //! Check: circulations of maps of a pair within their standard errors; pairs in narrow sectors; empty scans.
 
+mod in_turbulence;
+
+use self::in_turbulence::TurbulentFit;
 use crate::error::Error;
-use crate::retrieval::estimates_in_turbulence::{Estimates, TurbulentFit};
 use crate::retrieval::{
-    Flag, Movement, RetrievalOptions, ScanEstimator, ScanMap, ScanResult, Turbulence, VortexResult,
+    Flag, Movement, RetrievalOptions, ScanEstimator, ScanMap, ScanResult, VortexResult,
 };
 use crate::vortex_fit::map_fit::data::ends;
 use crate::vortex_fit::map_fit::starts::chi2;
@@ -184,24 +186,6 @@ impl EstimateFits<'_> {
 
     fn response(&self, moves: bool) -> &EstimatorResponse<'_> {
         if moves { &self.moving } else { &self.still }
-    }
-
-    /// A fit with the turbulence of the scan in its covariance, if that is requested.
-    ///
-    /// # Errors
-    /// What the covariance refuses.
-    fn in_turbulence(&self, fit: &MapFit, moves: bool) -> Result<Option<TurbulentFit>, Error> {
-        if self.options.turbulence != Some(Turbulence::OfScan) {
-            return Ok(None);
-        }
-        let estimates = Estimates {
-            scan: self.scan,
-            view: &self.view,
-            model: &self.options.model,
-            response: self.response(moves),
-            options: &self.map_options,
-        };
-        estimates.in_turbulence(fit)
     }
 
     /// A pair that stands out of the wind, with the secondary vortices that the map shows beside it.

@@ -33,7 +33,6 @@ mod aliases;
 mod alternatives;
 mod envelope;
 mod estimates;
-mod estimates_in_turbulence;
 mod fit;
 mod gate_means;
 mod gates;

@@ -247,10 +247,8 @@ impl Table {
         let mut values_m2_s2 = Vec::with_capacity(knots * knots);
         let along_m: Vec<f64> = (0..knots).map(|i| (step * i as f64).powi(2)).collect();
         for across_m in &along_m {
-            let line = AcrossBeam::new(correlation, outer_scale_m, std_m, *across_m);
-            for along_m in &along_m {
-                values_m2_s2.push(line.covariance_m2_s2(*along_m));
-            }
+            let row = covariances_m2_s2(correlation, outer_scale_m, std_m, *across_m, &along_m);
+            values_m2_s2.extend(row);
         }
         Self {
             values_m2_s2,
@@ -297,80 +295,69 @@ impl Table {
     }
 }
 
-/// The correlation along a beam at one distance across, on nodes that crowd where the separation is least: positions y sinh t, on
-/// which the separation is y cosh t.
-struct AcrossBeam<'a> {
-    correlation: &'a Correlation,
-    per_w: f64,
-    variance_m2_s2: f64,
+/// Step of t, and of Gaussian weights far from the least separation in standard deviations: the trapezoidal rule is exact to
+/// 1e-8 with both.
+const STEP: f64 = 0.1;
+const FAR_STEP: f64 = 0.5;
+/// Distance along the beam in standard deviations from which the other gate does not reach the least separation.
+const FAR: f64 = 7.5;
+
+/// Covariances \[m²/s²\] of parallel gates at one distance across their beams and some along them. Where they are near, the correlation is
+/// summed on nodes that crowd where the separation is least: positions y sinh t, on which the separation is y cosh t.
+fn covariances_m2_s2(
+    correlation: &Correlation,
+    outer_scale_m: f64,
     std_m: f64,
     across_m: f64,
-    /// Positions along the beam \[m\], increasing, and the correlation there times the step.
-    nodes: Vec<(f64, f64)>,
-}
-
-impl<'a> AcrossBeam<'a> {
-    /// Step of t, and of Gaussian weights far from the least separation in standard deviations: the trapezoidal rule is exact to
-    /// 1e-8 with both.
-    const STEP: f64 = 0.1;
-    const FAR_STEP: f64 = 0.5;
-    /// Distance along the beam in standard deviations from which the other gate does not reach the least separation.
-    const FAR: f64 = 7.5;
-
-    fn new(correlation: &'a Correlation, outer_scale_m: f64, std_m: f64, across_m: f64) -> Self {
-        let across_m = across_m.max(LEAST_ACROSS * std_m);
-        let mut line = Self {
-            correlation,
-            per_w: outer_scale_m.powf(-2.0 / 3.0),
-            variance_m2_s2: unit_turbulence(outer_scale_m).variance_m2_s2(),
-            std_m,
-            across_m,
-            nodes: Vec::new(),
-        };
-        let end = ((Self::FAR + REACH) * std_m / across_m).asinh();
-        let count = (end / Self::STEP).ceil() as i32;
-        for i in -count..=count {
-            let t = Self::STEP * f64::from(i);
-            let position_m = across_m * t.sinh();
-            let width_m = Self::STEP * across_m * t.cosh();
-            let value = line.at(position_m);
-            line.nodes.push((position_m, value * width_m));
-        }
-        line
+    along_m: &[f64],
+) -> Vec<f64> {
+    let across_m = across_m.max(LEAST_ACROSS * std_m);
+    let per_w = outer_scale_m.powf(-2.0 / 3.0);
+    // Positions along the beam, increasing, and the correlation there times the step.
+    let mut nodes = Vec::new();
+    let end = ((FAR + REACH) * std_m / across_m).asinh();
+    let count = (end / STEP).ceil() as i32;
+    for i in -count..=count {
+        let t = STEP * f64::from(i);
+        let position_m = across_m * t.sinh();
+        let width_m = STEP * across_m * t.cosh();
+        let value = correlation_along(correlation, per_w, across_m, position_m);
+        nodes.push((position_m, value * width_m));
     }
-
-    /// Correlation of the components along the beam, `position_m` apart along it.
-    fn at(&self, position_m: f64) -> f64 {
-        let across2 = self.across_m * self.across_m;
-        let r2 = position_m * position_m + across2;
-        let (f, g) = self.correlation.at(r2.cbrt() * self.per_w);
-        f - g * across2 / r2
-    }
-
-    fn covariance_m2_s2(&self, along_m: f64) -> f64 {
+    let variance_m2_s2 = unit_turbulence(outer_scale_m).variance_m2_s2();
+    let mut covariances_m2_s2 = Vec::with_capacity(along_m.len());
+    for &along_m in along_m {
         let mut sum = 0.0;
         let mut total = 0.0;
-        let reach_m = REACH * self.std_m;
+        let reach_m = REACH * std_m;
         // Gates that are wide apart, or whose correlation is smooth over a weight.
-        if along_m > Self::FAR * self.std_m || self.across_m > 4.0 * self.std_m {
-            let count = (REACH / Self::FAR_STEP) as i32;
+        if along_m > FAR * std_m || across_m > 4.0 * std_m {
+            let count = (REACH / FAR_STEP) as i32;
             for i in -count..=count {
-                let deviations = Self::FAR_STEP * f64::from(i);
+                let deviations = FAR_STEP * f64::from(i);
                 let weight = (-0.5 * deviations * deviations).exp();
-                sum += weight * self.at(along_m + deviations * self.std_m);
+                let position_m = along_m + deviations * std_m;
+                sum += weight * correlation_along(correlation, per_w, across_m, position_m);
                 total += weight;
             }
         } else {
-            let first = self
-                .nodes
-                .partition_point(|node| node.0 < along_m - reach_m);
-            let own = self.nodes[first..].iter();
+            let first = nodes.partition_point(|node| node.0 < along_m - reach_m);
+            let own = nodes[first..].iter();
             for (position_m, value) in own.take_while(|node| node.0 <= along_m + reach_m) {
-                let deviations = (position_m - along_m) / self.std_m;
+                let deviations = (position_m - along_m) / std_m;
                 sum += value * (-0.5 * deviations * deviations).exp();
             }
-            total = (2.0 * std::f64::consts::PI).sqrt() * self.std_m;
+            total = (2.0 * std::f64::consts::PI).sqrt() * std_m;
         }
-        self.variance_m2_s2 * sum / total
+        covariances_m2_s2.push(variance_m2_s2 * sum / total);
     }
+    covariances_m2_s2
+}
+
+/// Correlation of the components along the beams of two points, `position_m` apart along them.
+fn correlation_along(correlation: &Correlation, per_w: f64, across_m: f64, position_m: f64) -> f64 {
+    let across2 = across_m * across_m;
+    let r2 = position_m * position_m + across2;
+    let (f, g) = correlation.at(r2.cbrt() * per_w);
+    f - g * across2 / r2
 }

@@ -237,52 +237,25 @@ fn stack(bins: &[Bin], number: usize) -> std::ops::Range<usize> {
     range
 }
 
-/// Velocities that are fitted together.
-struct Stack {
-    used: Vec<Cell>,
-    /// Their heights over that of the bin; a difference of 1 is the whole stack.
-    heights: Vec<f64>,
-    /// Where those of the bin begin.
-    first_own: usize,
-    has_few_cells: bool,
-}
-
-impl Stack {
-    /// How the velocities depend on the components along `axes`, and on their slopes over height where bins are fitted together.
-    fn rows(&self, axes: &[[f64; 3]]) -> Array2<f64> {
-        let count = axes.len();
-        let columns = if self.has_few_cells { 2 * count } else { count };
-        Array2::from_shape_fn((self.used.len(), columns), |(i, j)| {
-            let along = dot(self.used[i].direction, axes[j % count]);
-            if j < count {
-                along
-            } else {
-                along * self.heights[i]
-            }
-        })
-    }
-}
-
-fn stacked(bins: &[Bin], number: usize) -> Stack {
-    let range = stack(bins, number);
+/// Heights of the velocities of bins that are fitted together over that of one of them; a difference of 1 is all of these bins.
+fn heights_over(bins: &[Bin], number: usize, range: std::ops::Range<usize>) -> Vec<f64> {
     let span_m = bins[range.end - 1].height_m - bins[range.start].height_m;
-    let mut stack = Stack {
-        used: Vec::new(),
-        heights: Vec::new(),
-        first_own: 0,
-        has_few_cells: range.len() > 1,
-    };
-    for bin in range {
-        if bin == number {
-            stack.first_own = stack.used.len();
-        }
-        for cell in &bins[bin].cells {
-            stack.used.push(*cell);
-            let over_m = bins[bin].height_m - bins[number].height_m;
-            stack.heights.push(over_m / span_m.max(1.0));
-        }
+    let mut heights = Vec::new();
+    for bin in &bins[range] {
+        let over_m = bin.height_m - bins[number].height_m;
+        heights.resize(heights.len() + bin.cells.len(), over_m / span_m.max(1.0));
     }
-    stack
+    heights
+}
+
+/// How velocities depend on the components along `axes`, and on their slopes over height if these are fitted.
+fn rows(cells: &[Cell], axes: &[[f64; 3]], heights: &[f64], has_slopes: bool) -> Array2<f64> {
+    let count = axes.len();
+    let columns = if has_slopes { 2 * count } else { count };
+    Array2::from_shape_fn((cells.len(), columns), |(i, j)| {
+        let along = dot(cells[i].direction, axes[j % count]);
+        if j < count { along } else { along * heights[i] }
+    })
 }
 
 /// The wind of one bin.
@@ -299,11 +272,19 @@ fn wind_of(
     if axes.is_empty() {
         return Ok(BinWind::Undetermined);
     }
-    let stack = stacked(bins, number);
+    let range = stack(bins, number);
+    let has_few_cells = range.len() > 1;
+    let used: Vec<Cell> = bins[range.clone()]
+        .iter()
+        .flat_map(|bin| bin.cells.iter().copied())
+        .collect();
+    let before = bins[range.start..number].iter();
+    let first_own = before.map(|bin| bin.cells.len()).sum();
+    let heights = heights_over(bins, number, range);
     let count = axes.len();
-    let rows = stack.rows(&axes);
-    let velocities: Vec<f64> = stack.used.iter().map(|cell| cell.velocity_m_s).collect();
-    let folds = stack.used.iter().map(|cell| cell.fold_m_s);
+    let rows = rows(&used, &axes, &heights, has_few_cells);
+    let velocities: Vec<f64> = used.iter().map(|cell| cell.velocity_m_s).collect();
+    let folds = used.iter().map(|cell| cell.fold_m_s);
     let folds_m_s: Vec<f64> = folds.map(|fold| fold.unwrap_or(f64::INFINITY)).collect();
     let data = RadialVelocities {
         rows: rows.view(),
@@ -329,10 +310,10 @@ fn wind_of(
     Ok(BinWind::Found(Box::new(FoundWind {
         gain: gain.slice(s![..count, ..]).to_owned(),
         has_no_up: count < components.axes.len(),
-        has_few_cells: stack.has_few_cells,
+        has_few_cells,
         axes,
         fit,
-        used: stack.used,
-        first_own: stack.first_own,
+        used,
+        first_own,
     })))
 }

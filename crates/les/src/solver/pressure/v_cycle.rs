@@ -170,6 +170,16 @@ impl Axis {
         self.mass.len()
     }
 
+    /// Link of the last cell to the first; zero unless the direction is periodic.
+    fn wrap(&self) -> f32 {
+        self.link[self.len() - 1]
+    }
+
+    /// Cells of a line before the cut: all unless the direction is periodic.
+    fn inner(&self) -> usize {
+        self.len() - usize::from(self.wrap() != 0.0)
+    }
+
     /// The mesh of pairs, of which the last of an odd number stays alone.
     fn coarsened(&self) -> Self {
         let mut mass = Vec::with_capacity(self.len().div_ceil(2));
@@ -320,14 +330,6 @@ fn relax(
     let along = &level.axes[a];
     let across = &level.axes[1 - a];
     let n = along.len();
-    let wrap = along.link[n - 1];
-    let relaxed = LinesAlong {
-        level,
-        axis: a,
-        mode,
-        wrap,
-        inner: if wrap == 0.0 { n } else { n - 1 },
-    };
     let groups = across.lines.len();
     for group in 0..groups {
         let number = if in_reverse {
@@ -336,15 +338,15 @@ fn relax(
             group
         };
         let lines = &across.lines[number];
-        relaxed.eliminate(lines, u, f, line);
-        let weighted = relaxed.substitute(lines.len(), line);
+        level.eliminate(a, mode, lines, u, f, line);
+        let weighted = level.substitute(a, lines.len(), line);
         for (g, &position) in lines.iter().enumerate() {
             let mut cut = [0.0; LANES];
-            if relaxed.inner < n {
-                cut = relaxed.value_at_cut(position, g, &weighted[g], line);
+            if along.inner() < n {
+                cut = level.value_at_cut(a, mode, position, g, &weighted[g], line);
             }
             for (k, line) in line[..n].iter().enumerate() {
-                let [j, k] = relaxed.cell(position, k);
+                let [j, k] = level.place(a, position, k);
                 let out = &mut u[k * level.axes[0].len() + j];
                 for l in 0..LANES {
                     out[l] += line[g].border[l].mul_add(cut[l], line[g].right[l]);
@@ -354,50 +356,43 @@ fn relax(
     }
 }
 
-/// The lines along one axis of a level, which are relaxed.
-struct LinesAlong<'a> {
-    level: &'a Level,
-    axis: usize,
-    mode: &'a Lanes,
-    /// Link of the last cell to the first; zero unless the direction is periodic.
-    wrap: f32,
-    /// Cells before the cut.
-    inner: usize,
-}
-
-impl LinesAlong<'_> {
-    /// Indices of cell `k` of the line at a position across the lines.
+impl Level {
+    /// Place of cell `k` of the line along an axis at a position across the lines.
     #[inline(always)]
-    fn cell(&self, position: usize, k: usize) -> [usize; 2] {
-        if self.axis == 0 {
+    fn place(&self, axis: usize, position: usize, k: usize) -> [usize; 2] {
+        if axis == 0 {
             [k, position]
         } else {
             [position, k]
         }
     }
 
-    /// Eliminates a group of lines from the first cell to the last.
+    /// Eliminates a group of lines along an axis from the first cell to the last.
     #[inline(always)]
     fn eliminate(
         &self,
+        axis: usize,
+        mode: &Lanes,
         positions: &[usize],
         u: &[Lanes],
         f: &[Lanes],
         line: &mut [[Cell; TOGETHER]],
     ) {
-        let along = &self.level.axes[self.axis];
-        let across = &self.level.axes[1 - self.axis];
+        let along = &self.axes[axis];
+        let across = &self.axes[1 - axis];
         let n = along.len();
+        let wrap = along.wrap();
+        let inner = along.inner();
         let mut excess = [[0.0; LANES]; TOGETHER];
         for k in 0..n {
             let mass = along.mass[k] as f32;
-            let first = if k == 0 { self.wrap } else { 0.0 };
+            let first = if k == 0 { wrap } else { 0.0 };
             let behind = if k == 0 { 0.0 } else { along.link[k - 1] };
             let ahead = if k + 1 < n { along.link[k] } else { 0.0 };
             for (g, &position) in positions.iter().enumerate() {
-                let left = residual_at(self.level, self.cell(position, k), self.mode, u, f);
+                let left = residual_at(self, self.place(axis, position, k), mode, u, f);
                 let inverse_mass = 1.0 / across.mass[position] as f32;
-                let before = if k == 0 || k == self.inner {
+                let before = if k == 0 || k == inner {
                     NO_CELL
                 } else {
                     line[k - 1][g]
@@ -406,7 +401,7 @@ impl LinesAlong<'_> {
                 let excess = &mut excess[g];
                 for l in 0..LANES {
                     let ratio = behind * before.inverse[l];
-                    let shift = self.mode[l] + across.diagonal[position];
+                    let shift = mode[l] + across.diagonal[position];
                     excess[l] = mass.mul_add(shift, ratio.mul_add(excess[l], first));
                     let pivot = ahead + excess[l];
                     current.inverse[l] = if pivot == 0.0 { 0.0 } else { 1.0 / pivot };
@@ -420,14 +415,20 @@ impl LinesAlong<'_> {
     /// Substitutes a group of `count` lines from the cut to the first cell; returns the masses of
     /// the lines weighted with the response to the value at the cut.
     #[inline(always)]
-    fn substitute(&self, count: usize, line: &mut [[Cell; TOGETHER]]) -> [Lanes; TOGETHER] {
-        let along = &self.level.axes[self.axis];
+    fn substitute(
+        &self,
+        axis: usize,
+        count: usize,
+        line: &mut [[Cell; TOGETHER]],
+    ) -> [Lanes; TOGETHER] {
+        let along = &self.axes[axis];
         let n = along.len();
+        let inner = along.inner();
         let mut weighted = [[0.0; LANES]; TOGETHER];
         let mut next = [NO_CELL; TOGETHER];
-        for k in (0..self.inner).rev() {
+        for k in (0..inner).rev() {
             let ahead = if k + 1 < n { along.link[k] } else { 0.0 };
-            let to_cut = if k + 1 == self.inner { ahead } else { 0.0 };
+            let to_cut = if k + 1 == inner { ahead } else { 0.0 };
             for g in 0..count {
                 let current = &mut line[k][g];
                 let next = &mut next[g];
@@ -449,23 +450,26 @@ impl LinesAlong<'_> {
     #[inline(always)]
     fn value_at_cut(
         &self,
+        axis: usize,
+        mode: &Lanes,
         position: usize,
         g: usize,
         weighted: &Lanes,
         line: &mut [[Cell; TOGETHER]],
     ) -> Lanes {
-        let along = &self.level.axes[self.axis];
-        let across = &self.level.axes[1 - self.axis];
-        let inner = self.inner;
+        let along = &self.axes[axis];
+        let across = &self.axes[1 - axis];
+        let inner = along.inner();
+        let wrap = along.wrap();
         let first = &line[0][g].right;
         let last = &line[inner - 1][g].right;
         let right = &line[inner][g].right;
         let mut cut = [0.0; LANES];
         for l in 0..LANES {
-            let pivot = (self.mode[l] + across.diagonal[position])
-                * (along.mass[inner] as f32 + weighted[l]);
+            let pivot =
+                (mode[l] + across.diagonal[position]) * (along.mass[inner] as f32 + weighted[l]);
             let links = along.link[inner - 1].mul_add(last[l], right[l]);
-            let right = self.wrap.mul_add(first[l], links);
+            let right = wrap.mul_add(first[l], links);
             cut[l] = if pivot == 0.0 { 0.0 } else { right / pivot };
         }
         line[inner][g] = Cell {

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! A is the curvature of the robust cost, G the slopes times the second derivatives of the loss, R the covariance of the noise, which gates whose
-//! pulses and windows overlap and lines of one region share, and the rest as in [`scan_turbulence`](super::scan_turbulence). The fit is that to
+//! pulses and windows overlap and lines of one region share, and the rest as in [`scan_turbulence`](crate::retrieval::scan_turbulence). The fit is that to
 //! independent velocities: generalised least squares, which weigh differences of neighbours most, were tried and had no smaller errors in strong
 //! turbulence, probably because peaks jump there from place to place. Turbulence that does not stand out of the noise is added to the covariance that the fit has
 //! without it.
@@ -13,10 +13,11 @@
 
 use ndarray::Array2;
 
+use super::EstimateFits;
 use crate::error::Error;
 use crate::retrieval::report::OUTLIER;
 use crate::retrieval::scan_turbulence::{Remainder, gate_covariance, gate_positions};
-use crate::retrieval::{ScanMap, ScanTurbulence};
+use crate::retrieval::{ScanTurbulence, Turbulence};
 use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::map_fit::coarse::every;
 use crate::vortex_fit::map_fit::estimates::{EstimatorPrediction, near_vortex};
@@ -25,7 +26,7 @@ use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Scores};
 use crate::vortex_fit::map_fit::local_circulation::CIRCULATIONS;
 use crate::vortex_fit::map_fit::setting::keep_small_cores;
 use crate::vortex_fit::tolerances::ESTIMATES;
-use crate::vortex_fit::{EstimatorResponse, MapFit, MapFitOptions, VelocityMap, Wake, WakeModel};
+use crate::vortex_fit::{MapFit, VelocityMap, Wake};
 use crate::wind_profile::GateCovariance;
 
 /// Distance of the places from which turbulence is found: of lines over the radius of their regions, of gates over the width of their weight. The
@@ -47,29 +48,27 @@ pub(super) struct TurbulentFit {
     pub(super) of_air: Array2<f64>,
 }
 
-/// A scan and what its estimator makes of a wake.
-pub(super) struct Estimates<'a, 'm> {
-    pub(super) scan: &'a ScanMap,
-    pub(super) view: &'a VelocityMap<'m>,
-    pub(super) model: &'a WakeModel,
-    pub(super) response: &'a EstimatorResponse<'a>,
-    pub(super) options: &'a MapFitOptions,
-}
-
-impl<'a> Estimates<'a, '_> {
-    /// A fit to independent velocities in the turbulence beside its wake; nothing where velocities are too few to tell it from noise. Turbulence that
-    /// stands out of the noise gives the covariance, and each circulation is that of what is near its vortex, in a wind of its own, where that has
-    /// the smaller variance. Other turbulence is added to the covariance of the fit.
+impl EstimateFits<'_> {
+    /// A fit to independent velocities in the turbulence beside its wake, if that of the scan is requested; nothing where velocities are too few to
+    /// tell it from noise. Turbulence that stands out of the noise gives the covariance, and each circulation is that of what is near its vortex, in
+    /// a wind of its own, where that has the smaller variance. Other turbulence is added to the covariance of the fit.
     ///
     /// # Errors
     /// [`Error::Linalg`] if a free parameter does not show in the map; [`Error::OutOfRange`] for impossible input.
-    pub(super) fn in_turbulence(&self, fit: &MapFit) -> Result<Option<TurbulentFit>, Error> {
-        let shown = self.shown_at(self.view)?;
+    pub(super) fn in_turbulence(
+        &self,
+        fit: &MapFit,
+        moves: bool,
+    ) -> Result<Option<TurbulentFit>, Error> {
+        if self.options.turbulence != Some(Turbulence::OfScan) {
+            return Ok(None);
+        }
+        let shown = self.shown_at(&self.view, moves)?;
         let for_slopes = shown.coarse_for_slopes();
         let shown = shown.with_slopes_at(for_slopes.as_ref())?;
         let setting = shown.setting();
         let mut p = fit.wake.to_array().to_vec();
-        let mut groups = self.options.free.groups_of(&fit.wake);
+        let mut groups = self.map_options.free.groups_of(&fit.wake);
         keep_small_cores(&mut p, &mut groups, setting.least_core_m);
         let linear = setting.linear(&p, &groups, None)?;
         let squares = setting.about(&linear);
@@ -101,18 +100,20 @@ impl<'a> Estimates<'a, '_> {
         turbulent.fit.covariance.assign(&in_all);
         for side in 0..CIRCULATIONS.len() {
             let of_pair = (&groups[..], &in_all);
-            if let Some(local) = self.nearby(&fit.wake, side, air, of_pair) {
+            if let Some(local) = self.nearby(&fit.wake, side, moves, air, of_pair) {
                 turbulent.take_if_less_uncertain(side, local);
             }
         }
         Ok(Some(turbulent))
     }
 
-    fn shown_at<'m: 'a>(
-        &self,
+    fn shown_at<'s, 'm: 's>(
+        &'s self,
         map: &VelocityMap<'m>,
-    ) -> Result<EstimatorPrediction<'a, 'm>, Error> {
-        EstimatorPrediction::new(map, self.model, self.response, self.options, 1.0)
+        moves: bool,
+    ) -> Result<EstimatorPrediction<'s, 'm>, Error> {
+        let response = self.response(moves);
+        EstimatorPrediction::new(map, &self.options.model, response, &self.map_options, 1.0)
     }
 
     /// What a wake leaves of the velocities at every few lines and gates.
@@ -134,7 +135,7 @@ impl<'a> Estimates<'a, '_> {
         let rows = few.rows(p, groups);
         let cells = few.cells;
         let noise_std_m_s = cells.iter().map(|cell| cell.sigma_m_s).collect();
-        let gates = gate_positions(self.scan, &cells, self.model, &Wake::from_list(p));
+        let gates = gate_positions(self.scan, &cells, &self.options.model, &Wake::from_list(p));
         let correlation = Array2::from_shape_fn((cells.len(), cells.len()), |(i, j)| {
             noise([&cells[i], &cells[j]])
         });
@@ -163,7 +164,7 @@ impl<'a> Estimates<'a, '_> {
         noise: &'c (impl Fn([&Cell; 2]) -> f64 + Sync),
         [cells, in_scan]: [&'c [Cell]; 2],
     ) -> impl Fn(usize, usize) -> f64 + Sync + 'c {
-        let gates = gate_positions(self.scan, in_scan, self.model, wake);
+        let gates = gate_positions(self.scan, in_scan, &self.options.model, wake);
         move |i, j| {
             let air_m2_s2 = turbulence.covariance_of_air_m2_s2(table, [&gates[i], &gates[j]]);
             let of_noise = turbulence.noise_factor * noise([&cells[i], &cells[j]]);
@@ -177,12 +178,17 @@ impl<'a> Estimates<'a, '_> {
         &self,
         pair: &Wake,
         side: usize,
+        moves: bool,
         air: (&ScanTurbulence, &GateCovariance),
         of_pair: (&[Vec<usize>], &Array2<f64>),
     ) -> Option<(f64, f64)> {
-        let near = near_vortex(self.view, self.model, &[pair.left, pair.right][side]);
+        let near = near_vortex(
+            &self.view,
+            &self.options.model,
+            &[pair.left, pair.right][side],
+        );
         let map = near.map();
-        let shown = self.shown_at(&map).ok()?;
+        let shown = self.shown_at(&map, moves).ok()?;
         let setting = shown.setting();
         let best = setting.settled_nearby(pair, side, ESTIMATES)?;
         let noise = noise_correlation(&shown.prepared, &best.cells);
