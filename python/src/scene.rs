@@ -38,8 +38,7 @@ pub(crate) fn scene<'py>(
         let key: String = key.extract()?;
         set(&mut table, &key, value_of(&key, &value)?);
     }
-    let file = SceneFile::parse(&table.to_string(), Path::new("scene"))
-        .map_err(|error| refused(error.into()))?;
+    let file = SceneFile::parse(&table.to_string(), Path::new("scene")).map_err(refused)?;
     self::table(py, &file.toml)
 }
 

@@ -406,7 +406,7 @@ fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
     assert!(contents(folder.path()).is_empty(), "nothing was written");
     let mischief = Mischief(in_the_way);
     let error = run(&vortices(None), folder.path(), Begin::New, &mischief).unwrap_err();
-    assert!(matches!(error, Error::Exists { .. }), "{error}");
+    assert!(matches!(error, Error::NotWritten { .. }), "{error}");
     assert!(wakescope_les::solver::check_checkpoint(folder.path().join("flow.checkpoint")).is_ok());
     fs::remove_dir(folder.path().join("fields_0002.nc")).unwrap();
     assert!(
