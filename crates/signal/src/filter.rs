@@ -9,6 +9,10 @@
 //! Check: a constant is preserved to round-off, and so is a linear profile (at `c T_s/4` before R
 //! for a gate); the discrete weights agree with a fine quadrature.
 
+use std::ops::Range;
+
+use multiversion::multiversion;
+
 use crate::error::{check, check_any, check_each, check_length, check_positive};
 use crate::{Error, Pulse, SPEED_OF_LIGHT_M_S};
 
@@ -19,8 +23,8 @@ const STEPS_PER_LAYER: f64 = (1_u64 << 24) as f64;
 /// Halvings of an interval, which exhaust double precision.
 const HALVINGS: usize = 60;
 
-/// Ranges whose sums are formed side by side, so that none waits for the addition before.
-const TOGETHER: usize = 4;
+/// Ranges whose sums are formed side by side.
+const LANES: usize = 16;
 
 /// Smallest fraction of the weight on air with a known velocity.
 const LEAST_KNOWN_WEIGHT: f64 = 0.5;
@@ -53,46 +57,85 @@ impl LayerWeights {
         is_known: bool,
         out_m_s: &mut [f64],
     ) {
-        let known: f64 = self.weights.iter().sum();
-        for (layers, out_m_s) in layers.chunks(TOGETHER).zip(out_m_s.chunks_mut(TOGETHER)) {
-            let mut parts = Vec::with_capacity(TOGETHER);
-            if is_known {
-                parts.extend(
-                    layers
-                        .iter()
-                        .filter_map(|layer| self.covered(*layer, radial_velocity_m_s)),
-                );
-            }
-            if let &[a, b, c, d] = parts.as_slice() {
-                for (out, sum) in out_m_s.iter_mut().zip(self.sums([a, b, c, d])) {
-                    *out = sum / known;
-                }
-                continue;
-            }
-            for (layer, out) in layers.iter().zip(out_m_s) {
+        let mut side_by_side = 0..0;
+        let covered = self.covered(layers, radial_velocity_m_s.len());
+        // Fewer ranges, which may lie far apart, are not worth the memory.
+        if let Some(stride) = equal_stride(layers)
+            && is_known
+            && covered.len() >= LANES
+        {
+            let first = layers[covered.start] + self.first;
+            let profile = &radial_velocity_m_s[first as usize..];
+            self.means(profile, stride, &mut out_m_s[covered.clone()]);
+            side_by_side = covered;
+        }
+        for (index, layer) in layers.iter().enumerate() {
+            if !side_by_side.contains(&index) {
                 let first = layer.saturating_add(self.first);
-                *out = mean_of_profile(&self.weights, first, radial_velocity_m_s);
+                out_m_s[index] = mean_of_profile(&self.weights, first, radial_velocity_m_s);
             }
         }
     }
 
-    /// The layers of a profile that the weights about one of them lie on, if it has them all.
-    fn covered<'v>(&self, layer: i64, radial_velocity_m_s: &'v [f64]) -> Option<&'v [f64]> {
-        let first = usize::try_from(layer.checked_add(self.first)?).ok()?;
-        radial_velocity_m_s.get(first..first.checked_add(self.weights.len())?)
+    /// Which of some increasing layers have all their weights on a profile of this length.
+    fn covered(&self, layers: &[i64], length: usize) -> Range<usize> {
+        let last = length as i64 - self.weights.len() as i64;
+        let first_of = |layer: &i64| layer.saturating_add(self.first);
+        let start = layers.partition_point(|layer| first_of(layer) < 0);
+        let end = layers.partition_point(|layer| first_of(layer) <= last);
+        start..end.max(start)
     }
 
-    /// Sums of several parts of a profile, side by side, each in the order of its layers.
-    fn sums(&self, [a, b, c, d]: [&[f64]; TOGETHER]) -> [f64; TOGETHER] {
-        let mut sums = [0.0; TOGETHER];
-        let parts = a.iter().zip(b).zip(c.iter().zip(d));
-        for (weight, ((a, b), (c, d))) in self.weights.iter().zip(parts) {
-            sums[0] += weight * a;
-            sums[1] += weight * b;
-            sums[2] += weight * c;
-            sums[3] += weight * d;
+    /// Means of a profile from its start, and from 1, 2, .. `stride` layers farther on, each in the
+    /// order of its layers.
+    fn means(&self, profile: &[f64], stride: usize, out_m_s: &mut [f64]) {
+        // Layers of one place between two ranges lie side by side.
+        let columns = out_m_s.len().next_multiple_of(LANES) + self.weights.len() / stride;
+        let mut phases = vec![0.0; stride * columns];
+        for (column, part) in profile.chunks(stride).take(columns).enumerate() {
+            for (phase, velocity_m_s) in part.iter().enumerate() {
+                phases[phase * columns + column] = *velocity_m_s;
+            }
         }
-        sums
+        sums_of_phases(&self.weights, &phases, stride, out_m_s);
+        let known: f64 = self.weights.iter().sum();
+        for mean in out_m_s {
+            *mean /= known;
+        }
+    }
+}
+
+/// The distance between layers that are equally spaced and increase.
+fn equal_stride(layers: &[i64]) -> Option<usize> {
+    let stride = layers.get(1)?.checked_sub(layers[0])?;
+    let is_equal = layers
+        .windows(2)
+        .all(|pair| pair[0].checked_add(stride) == Some(pair[1]));
+    usize::try_from(stride)
+        .ok()
+        .filter(|stride| is_equal && *stride > 0)
+}
+
+/// Weighted sums of `phases` \[layer modulo `stride`, layer over `stride`\].
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn sums_of_phases(weights: &[f64], phases: &[f64], stride: usize, out: &mut [f64]) {
+    let columns = phases.len() / stride;
+    for (chunk, out) in out.chunks_mut(LANES).enumerate() {
+        let mut sums = [0.0; LANES];
+        let mut phase = 0;
+        let mut column = chunk * LANES;
+        for weight in weights {
+            let here = &phases[phase * columns + column..][..LANES];
+            for i in 0..LANES {
+                sums[i] += weight * here[i];
+            }
+            phase += 1;
+            if phase == stride {
+                phase = 0;
+                column += 1;
+            }
+        }
+        out.copy_from_slice(&sums[..out.len()]);
     }
 }
 
@@ -472,6 +515,31 @@ mod tests {
             0.5 * pulse().sigma_m().powi(2) + window,
             max_relative = 1e-12
         );
+    }
+
+    #[test]
+    fn means_side_by_side_have_the_bits_of_single_ones() {
+        let profile: Vec<f64> = (0..1500).map(|i| (0.37 * f64::from(i)).sin()).collect();
+        for (filter, _) in filters() {
+            for stride in [1, 2, 7, 20] {
+                let first_range_m = 200.0;
+                let range_m: Vec<f64> = (0..1500)
+                    .step_by(stride)
+                    .map(|layer| first_range_m + f64::from(layer) * filter.layer_thickness_m)
+                    .collect();
+                let mut together = vec![0.0; range_m.len()];
+                filter
+                    .apply_into(first_range_m, &profile, &range_m, &mut together)
+                    .unwrap();
+                for (range_m, mean) in range_m.iter().zip(&together) {
+                    let mut alone = [0.0];
+                    filter
+                        .apply_into(first_range_m, &profile, &[*range_m], &mut alone)
+                        .unwrap();
+                    assert_eq!(mean.to_bits(), alone[0].to_bits(), "{stride} {range_m}");
+                }
+            }
+        }
     }
 
     #[test]

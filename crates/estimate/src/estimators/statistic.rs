@@ -32,6 +32,18 @@ pub trait Statistic<S: Sample>: Sync {
         None
     }
 
+    /// How many numbers of a window [`Statistic::evaluate_record`] hands over.
+    fn sum_len(&self) -> usize {
+        self.statistic_len()
+    }
+
+    /// Writes the numbers of a window into `out`, from the sum over records of what [`Statistic::evaluate_record`] hands over for it.
+    ///
+    /// That is their sum, as here, unless a transform that all of them need is left for the sum.
+    fn statistic_of_sum(&self, sum: &[f64], _scratch: &mut Scratch, out: &mut [f64]) {
+        out.copy_from_slice(sum);
+    }
+
     /// Hands the numbers of all valid windows of a record, `step_samples` apart, to `each` with the index of the window.
     ///
     /// `record` may be a part of a longer one, in which it begins at `first_sample`; a window has the same numbers to the last bit

@@ -143,10 +143,18 @@ impl Scan {
         mean: &mut [f64],
     ) -> Result<usize, Error> {
         length("mean", self.numbers, mean.len())?;
+        let [level, _] = self.mean_and_windows(point, radius_m, mean);
+        Ok(level)
+    }
+
+    /// [`Self::region_mean`]; returns the numbers of valid windows, and of those that are stored, valid or not.
+    fn mean_and_windows(&self, point: PolarPoint, radius_m: f64, mean: &mut [f64]) -> [usize; 2] {
         mean.fill(0.0);
         let mut level = 0;
+        let mut windows = 0;
         for (line, gates) in self.chords(point, radius_m) {
             level += self.valid(line, &gates);
+            windows += gates.len() * self.geometry.rays.count(line);
             self.add_chord(line, &gates, mean);
         }
         if level > 0 {
@@ -155,7 +163,7 @@ impl Scan {
                 *value *= weight;
             }
         }
-        Ok(level)
+        [level, windows]
     }
 
     /// Velocities at `points`, in their order; with `correlation` also n_eff.
@@ -176,7 +184,7 @@ impl Scan {
             |(scratch, mean), index| {
                 let point = points[index];
                 let radius_m = radius.at_m(point.range_m)?;
-                let level = self.region_mean(point, radius_m, mean)?;
+                let [level, windows] = self.mean_and_windows(point, radius_m, mean);
                 let mut estimate = GateVelocity::none(Quality::Empty);
                 if level > 0 {
                     estimate = estimator.estimate(mean, scratch);
@@ -185,21 +193,12 @@ impl Scan {
                 Ok(MapPoint {
                     estimate,
                     level,
-                    left_out: self.windows(point, radius_m) - level,
+                    left_out: windows - level,
                     n_eff: correlation.map_or(f64::NAN, |gamma| self.n_eff(point, radius_m, gamma)),
                 })
             },
         );
         found.into_iter().collect()
-    }
-
-    /// Windows of a region that are stored, valid or not.
-    fn windows(&self, point: PolarPoint, radius_m: f64) -> usize {
-        let mut windows = 0;
-        for (line, gates) in self.chords(point, radius_m) {
-            windows += gates.len() * self.geometry.rays.count(line);
-        }
-        windows
     }
 
     /// Effective number of independent windows of a region, (sum n)^2 / sum of gamma^2 over pairs of one pulse.

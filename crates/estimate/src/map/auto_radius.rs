@@ -49,7 +49,7 @@ impl ScanGeometry {
         by_gates: &[f64],
         needed: f64,
     ) -> bool {
-        self.information(point, radius_m, by_gates) >= needed
+        self.information(point, radius_m, [by_gates])[0] >= needed
     }
 }
 

@@ -447,15 +447,22 @@ impl ScanGeometry {
         windows
     }
 
-    /// Information of a region when all samples are valid; 0 without any. `by_gates` holds the information of a ray whose chord has
-    /// 1, 2, .. gates; longer chords have the last of it.
+    /// Information of a region when all samples are valid, by each of some curves; 0 without any. A curve holds the information of a
+    /// ray whose chord has 1, 2, .. gates; longer chords have the last of it.
     #[must_use]
-    pub fn information(&self, point: PolarPoint, radius_m: f64, by_gates: &[f64]) -> f64 {
-        let mut information = 0.0;
+    pub fn information<const CURVES: usize>(
+        &self,
+        point: PolarPoint,
+        radius_m: f64,
+        by_gates: [&[f64]; CURVES],
+    ) -> [f64; CURVES] {
+        let mut information = [0.0; CURVES];
         for (line, gates) in self.chords(point, radius_m) {
-            let index = gates.len().min(by_gates.len()).wrapping_sub(1);
-            let of_ray = by_gates.get(index).copied().unwrap_or(0.0);
-            information += self.rays.count(line) as f64 * of_ray;
+            let rays = self.rays.count(line) as f64;
+            for (sum, by_gates) in information.iter_mut().zip(by_gates) {
+                let index = gates.len().min(by_gates.len()).wrapping_sub(1);
+                *sum += rays * by_gates.get(index).copied().unwrap_or(0.0);
+            }
         }
         information
     }
@@ -747,7 +754,7 @@ mod tests {
             .map(|(_, gates)| by_gates[gates.len() - 1])
             .sum();
         assert_relative_eq!(
-            geometry.information(point, 2.0, &by_gates),
+            geometry.information(point, 2.0, [&by_gates])[0],
             direct,
             max_relative = 1e-12
         );
@@ -759,8 +766,8 @@ mod tests {
             Some(geometry.most_gates(2.0))
         );
         // Longer chords than are known have what the longest known has.
-        assert_relative_eq!(geometry.information(point, 2.0, &[2.0]), 18.0);
-        assert_eq!(geometry.information(point, 2.0, &[]), 0.0);
+        assert_relative_eq!(geometry.information(point, 2.0, [&[2.0]])[0], 18.0);
+        assert_eq!(geometry.information(point, 2.0, [&[]])[0], 0.0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Biased correlogram of a weighted window, the statistic that is accumulated.
 //!
 //! Computes r_m = (1 / sum h^2) sum over n of h(n+m) s(n+m) h(n) conj(s(n)) for m = 0 .. N-1, by two transforms of 2 N
-//! points. Its Fourier transform with all lags is the zero-padded periodogram (29), corrected,
+//! points, the second of the sum of the power spectra of all records. Its Fourier transform with all lags is the zero-padded periodogram (29), corrected,
 //! at every frequency, so PA and CA share it. Check: against the sum written out, and that identity to 1e-12.
 //!
 //! With several weightings (tapers) it is the weighted sum of their correlograms.
@@ -109,6 +109,18 @@ impl<S: Sample> Correlogram<S> {
         weights
     }
 
+    /// Sums the power spectra of a window with its weightings in `scratch.power`.
+    fn transform_power(&self, window: &[S], scratch: &mut Scratch) {
+        self.transform.reset(scratch);
+        for taper in &self.tapers {
+            let weighted = window
+                .iter()
+                .zip(&taper.weights)
+                .map(|(sample, h)| sample.to_complex() * h);
+            self.transform.add_power(weighted, taper.factor, scratch);
+        }
+    }
+
     /// Number of lags N, lag 0 included.
     #[must_use]
     pub fn lags(&self) -> usize {
@@ -126,15 +138,36 @@ impl<S: Sample> Statistic<S> for Correlogram<S> {
     }
 
     fn evaluate(&self, window: &[S], scratch: &mut Scratch, out: &mut [f64]) {
-        self.transform.reset(scratch);
-        for taper in &self.tapers {
-            let weighted = window
-                .iter()
-                .zip(&taper.weights)
-                .map(|(sample, h)| sample.to_complex() * h);
-            self.transform.add_power(weighted, taper.factor, scratch);
-        }
+        self.transform_power(window, scratch);
         self.transform.lags_of_power(scratch, out);
+    }
+
+    fn sum_len(&self) -> usize {
+        self.transform.frequencies()
+    }
+
+    fn statistic_of_sum(&self, sum: &[f64], scratch: &mut Scratch, out: &mut [f64]) {
+        self.transform.reset(scratch);
+        scratch.power.copy_from_slice(sum);
+        self.transform.lags_of_power(scratch, out);
+    }
+
+    fn evaluate_record(
+        &self,
+        record: &[S],
+        _first_sample: usize,
+        step_samples: usize,
+        valid: &dyn Fn(usize) -> bool,
+        scratch: &mut Scratch,
+        each: &mut dyn FnMut(usize, &[f64]),
+    ) {
+        let windows = record.windows(self.lags()).step_by(step_samples);
+        for (gate, window) in windows.enumerate() {
+            if valid(gate) {
+                self.transform_power(window, scratch);
+                each(gate, &scratch.power);
+            }
+        }
     }
 
     fn product_weights(&self) -> Option<Array2<f64>> {

@@ -59,14 +59,18 @@ impl WindowTransform {
         }
     }
 
-    /// Clears `scratch.power` to the number of distinct frequencies: half if real, all if complex.
-    pub(crate) fn reset(&self, scratch: &mut Scratch) {
-        let bins = match self {
+    /// Number of distinct frequencies: half if real, all if complex.
+    pub(crate) fn frequencies(&self) -> usize {
+        match self {
             Self::Real(..) => self.padded() / 2 + 1,
             Self::Complex(..) => self.padded(),
-        };
+        }
+    }
+
+    /// Clears `scratch.power` to the number of frequencies.
+    pub(crate) fn reset(&self, scratch: &mut Scratch) {
         scratch.power.clear();
-        scratch.power.resize(bins, 0.0);
+        scratch.power.resize(self.frequencies(), 0.0);
         scratch
             .transform
             .resize(self.inner().max(scratch.transform.len()), Complex::ZERO);

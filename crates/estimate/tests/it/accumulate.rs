@@ -576,8 +576,7 @@ fn automatic_radius_is_the_smallest_that_reaches_the_target() {
         let radius_m = radius.at_m(range_m).unwrap();
         let point = PolarPoint::at_elevation(range_m, elevation_rad[50]);
         let std_m_s = |radius_m: f64| {
-            geometry
-                .information(point, radius_m, &by_gates(range_m))
+            geometry.information(point, radius_m, [&by_gates(range_m)])[0]
                 .sqrt()
                 .recip()
         };
@@ -704,4 +703,12 @@ fn products_that_do_not_fit_are_refused() {
     );
     let too_many = vec![Array2::zeros((SAMPLES, 64)); 2];
     assert!(sums.add_products(0, &too_many).is_err());
+    sums.add(0, Array2::ones((1, SAMPLES)).view()).unwrap();
+    let after_records = sums.add_products(0, &[Array2::zeros((SAMPLES, 64))]);
+    assert!(
+        after_records
+            .unwrap_err()
+            .to_string()
+            .contains("sum of records")
+    );
 }

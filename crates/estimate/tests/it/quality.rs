@@ -562,13 +562,13 @@ fn false_alarms<S: Draw>(
             ..
         } in &tested
         {
-            let mut mean = vec![0.0; statistic.statistic_len()];
+            let mut sum = vec![0.0; statistic.sum_len()];
             let share = 1.0 / (region.lines * region.gates) as f64;
             for record in &records {
                 let mut add = |_: usize, one: &[f64]| {
-                    mean.iter_mut()
-                        .zip(one)
-                        .for_each(|(sum, x)| *sum += x * share)
+                    for (sum, number) in sum.iter_mut().zip(one) {
+                        *sum += number * share;
+                    }
                 };
                 statistic.evaluate_record(
                     record,
@@ -579,6 +579,8 @@ fn false_alarms<S: Draw>(
                     &mut add,
                 );
             }
+            let mut mean = vec![0.0; statistic.statistic_len()];
+            statistic.statistic_of_sum(&sum, &mut scratch, &mut mean);
             for (_, estimator, _) in estimators {
                 let found = estimator.estimate(&mean, &mut scratch);
                 for (count, level) in alarms[at].1.iter_mut().zip(&levels[at]) {

@@ -138,9 +138,8 @@ impl<'p> Setting<'p> {
     fn of_snr(&self, range_m: f64, snr: f64) -> Result<BoundPoint, Error> {
         let radius_m = self.radius.at_m(range_m)?;
         let by_gates = self.of_rays.of_snr(snr, self.places.most_gates(radius_m))?;
-        let of_region = self
-            .places
-            .information(self.point(range_m), radius_m, &by_gates);
+        let point = self.point(range_m);
+        let [of_region] = self.places.information(point, radius_m, [&by_gates]);
         self.told(range_m, [snr; 2], [by_gates[0], of_region])
     }
 

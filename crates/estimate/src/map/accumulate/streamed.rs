@@ -28,8 +28,9 @@ pub struct ScanSums<'s, S, T: ?Sized> {
     /// Gates whose windows are summed.
     held: Range<usize>,
     record_samples: usize,
+    /// Numbers of each gate held, and their sums over the pulses of each line: what [`Statistic::evaluate_record`] hands over, or the
+    /// statistics themselves where they are sums of products.
     numbers: usize,
-    /// Statistics of each gate held, the pulses of a line added.
     rows: Vec<f64>,
     rule: MissingRule,
     invalid: BTreeMap<usize, Vec<bool>>,
@@ -79,7 +80,8 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         let allowed = "behind their start, at most the gates of a record";
         let exist = !held.is_empty() && held.end <= geometry.gates();
         check("end of the gates", held.end as f64, allowed, exist)?;
-        let numbers = statistic.statistic_len();
+        // The statistics take the places of the sums.
+        let numbers = statistic.sum_len().max(statistic.statistic_len());
         Ok(Self {
             statistic,
             gates: *gates,
@@ -168,14 +170,13 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     ///
     /// # Errors
     /// [`Error::Length`] for products of another number of samples or too few lags;
-    /// [`Error::OutOfRange`] if the statistic has no weights of products, or for lines that the scan
-    /// does not have.
+    /// [`Error::OutOfRange`] if the statistic has no weights of products, for lines that the scan
+    /// does not have, or after records.
     pub fn add_products(&mut self, first_line: usize, products: &[Array2<S>]) -> Result<(), Error> {
         let weights = self.statistic.product_weights();
         let allowed = "a statistic that is a sum of products of samples";
         check("product_weights", f64::NAN, allowed, weights.is_some())?;
         let weights = weights.unwrap_or_default();
-        self.of_products = true;
         let last_line = first_line + products.len();
         let allowed = "at most the number of lines of the scan";
         check(
@@ -192,6 +193,14 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
                 "those of the statistic or more",
                 line.ncols() >= weights.ncols(),
             )?;
+        }
+        if !self.of_products {
+            let largest = self.rows.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+            let allowed = "0, since products are not added to records";
+            check("sum of records", largest, allowed, largest == 0.0)?;
+            self.of_products = true;
+            self.numbers = self.statistic.statistic_len();
+            self.rows = vec![0.0; self.geometry.lines() * self.held.len() * self.numbers];
         }
         let largest = self.largest_root_mean_square(first_line, products);
         let scale = self.rescale_to(self.rule.binary_scale(std::iter::once(largest)));
@@ -247,9 +256,36 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         scale
     }
 
+    /// Replaces the sums of all gates by their statistics, in their places; no more memory is needed.
+    fn sums_to_statistics(&mut self) {
+        let statistic = self.statistic;
+        let before = self.numbers;
+        let numbers = statistic.statistic_len();
+        for_each_chunk(
+            &mut self.rows,
+            before,
+            || (Scratch::new(), vec![0.0; numbers]),
+            |(scratch, one), _, sums| {
+                let summed = &sums[..statistic.sum_len()];
+                statistic.statistic_of_sum(summed, scratch, one);
+                sums[..numbers].copy_from_slice(one);
+            },
+        );
+        let gates = self.rows.len() / before;
+        for gate in 0..gates {
+            self.rows
+                .copy_within(gate * before..gate * before + numbers, gate * numbers);
+        }
+        self.rows.truncate(gates * numbers);
+        self.numbers = numbers;
+    }
+
     /// The scan of the records that were added, ready to be averaged over any region.
     #[must_use]
-    pub fn finish(self) -> Scan {
+    pub fn finish(mut self) -> Scan {
+        if !self.of_products {
+            self.sums_to_statistics();
+        }
         let Self {
             geometry,
             held,

@@ -24,6 +24,8 @@ pub(crate) struct PredictedError {
     snr_db: Vec<f64>,
     /// Information on the velocity, 1/(m/s)^2, in 1, 2, .. windows of a pulse, for each ratio.
     by_gates: Vec<Vec<f64>>,
+    /// 1, 2, ..: the windows of a chord in the place of their information.
+    windows: Vec<f64>,
 }
 
 impl PredictedError {
@@ -45,6 +47,7 @@ impl PredictedError {
             places,
             snr_db,
             by_gates,
+            windows: (1..=count).map(|windows| windows as f64).collect(),
         })
     }
 
@@ -68,19 +71,21 @@ impl PredictedError {
         level: f64,
         snr_db: f64,
     ) -> f64 {
-        let whole = self.places.windows(point, radius_m) as f64;
         if snr_db.is_nan() || level.is_nan() || level <= 0.0 {
             return f64::NAN;
         }
         // Nearly straight between the ratios of the curve.
         let below =
             (self.snr_db.partition_point(|db| *db <= snr_db)).clamp(1, self.snr_db.len() - 1) - 1;
-        let information = |at: usize| {
+        let curves = [
+            &self.by_gates[below],
+            &self.by_gates[below + 1],
+            &self.windows,
+        ];
+        let [low, high, whole] =
             self.places
-                .information(point, radius_m, &self.by_gates[at])
-                .ln()
-        };
-        let ends = [information(below), information(below + 1)];
+                .information(point, radius_m, curves.map(Vec::as_slice));
+        let ends = [low.ln(), high.ln()];
         (interpolate(&self.snr_db[below..below + 2], &ends, snr_db).exp() * level / whole)
             .sqrt()
             .recip()

@@ -69,7 +69,7 @@ pub(super) fn tiles<S: Sample>(
 ) -> Result<Vec<Tile>, Error> {
     let reaches = reaches(estimator, places, range_m)?;
     // Sums of windows, and those of eight of them.
-    let window_bytes = estimator.tools.statistic.statistic_len() * size_of::<f64>() * 9 / 8;
+    let window_bytes = estimator.tools.statistic.sum_len() * size_of::<f64>() * 9 / 8;
     let step_rad = elevation_rad
         .windows(2)
         .map(|pair| (pair[1] - pair[0]).abs())
@@ -166,8 +166,7 @@ mod tests {
             let mut held = vec![0_u8; elevation_rad.len() * range_m.len()];
             for tile in tiles(&estimator, &places, &elevation_rad, range_m, most_bytes).unwrap() {
                 let (read, windows) = &tile.windows;
-                let bytes =
-                    read.len() * windows.len() * estimator.tools.statistic.statistic_len() * 9;
+                let bytes = read.len() * windows.len() * estimator.tools.statistic.sum_len() * 9;
                 assert!(
                     bytes <= most_bytes,
                     "{samples} samples: {bytes} bytes for {tile:?}"
