@@ -36,6 +36,24 @@ const NOTHING: f64 = 0.5;
 pub(super) fn fit_means(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
     options.validate()?;
     map.validate()?;
+    let found = fit_in_winds(map, options)?;
+    let is_pair = found.vortices.len() == 2;
+    if is_pair || options.movement != Movement::Auto || map.lasts_s() == 0.0 {
+        return Ok(found);
+    }
+    // With times that are not those of the air a search for vortices that move passes by those that stand still.
+    let at_rest = RetrievalOptions {
+        movement: Movement::Frozen,
+        ..options.clone()
+    };
+    let standing = fit_in_winds(map, &at_rest)?;
+    let least = found.statistic + RetrievalOptions::MOVES;
+    let is_better = standing.wake.is_some() && standing.statistic > least;
+    Ok(if is_better { standing } else { found })
+}
+
+/// The result in the wind, among those that folded velocities leave open, that explains the velocities best.
+fn fit_in_winds(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
     let mut unfolded = Unfolded::new(map, options)?;
     let mut options = options.clone();
     for _ in 0..OTHER_WINDS {

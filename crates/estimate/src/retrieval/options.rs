@@ -100,7 +100,8 @@ impl Turbulence {
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Movement {
     /// They stand still in scans of less than 2 s and move in longer ones, unless the other is better by 9 in chi-square: the times of a
-    /// file need not be those of the air (averaged scans, frozen simulations), and short scans hardly show which.
+    /// file need not be those of the air (averaged scans, frozen simulations), and short scans hardly show which. Where no pair is found
+    /// that moves, one that stands still is looked for from the beginning.
     Auto,
     /// They move.
     #[cfg_attr(feature = "clap", value(name = "yes"))]

@@ -78,6 +78,40 @@ fn vortices_in_gates_that_do_not_resolve_a_pair_are_ambiguous() {
     assert!(lone > 0);
 }
 
+/// A line at a wrong time, times of rays that are far too long, and times that begin anew at midnight.
+#[test]
+fn vortices_at_rest_are_found_whatever_the_times_of_the_lines() {
+    let case = case("a");
+    let count = case.map.time_s.len();
+    let mut one_is_wrong: Vec<f64> = (0..count).map(|line| 0.1 * line as f64).collect();
+    one_is_wrong[count - 1] = 3600.0;
+    let too_long: Vec<f64> = (0..count).map(|line| 20.0 * line as f64).collect();
+    let mut at_midnight: Vec<f64> = (0..count).map(|line| 0.1 * line as f64).collect();
+    for time_s in &mut at_midnight[..count / 2] {
+        *time_s += 86_400.0;
+    }
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(7100);
+    let velocity_m_s = white(&case, &mut rng);
+    for time_s in [one_is_wrong, too_long, at_midnight] {
+        for sigma_m_s in [case.map.sigma_m_s.clone(), None] {
+            let map = ScanMap {
+                velocity_m_s: velocity_m_s.clone(),
+                time_s: time_s.clone(),
+                sigma_m_s,
+                ..case.map.clone()
+            };
+            let options = RetrievalOptions {
+                movement: Movement::Auto,
+                ..case.options.clone()
+            };
+            let found = fit_scan(&map, Velocities::Means, &options).unwrap();
+            assert!(found.has(Flag::MotionIgnored), "{:?}", found.flags);
+            let errors = errors_over_bounds(&case, &found);
+            assert!(errors.iter().all(|e| e.abs() < 4.0), "{errors:?}");
+        }
+    }
+}
+
 /// Whether the vortices move is told by the scan where it can be, and else by how long it lasts.
 #[test]
 fn standing_vortices_are_taken_for_such_and_moving_ones_in_scans_of_seconds() {

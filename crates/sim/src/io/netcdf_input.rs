@@ -281,6 +281,11 @@ impl NetcdfFile {
         self.variable(variable)?.attribute(name)?.value.as_f64()
     }
 
+    /// The numbers of an attribute of a variable.
+    pub(crate) fn numbers(&self, variable: &str, name: &str) -> Option<Vec<f64>> {
+        self.variable(variable)?.attribute(name)?.value.as_f64_vec()
+    }
+
     /// Texts of a variable of the group or else of the root, whose last dimension are the characters.
     ///
     /// # Errors

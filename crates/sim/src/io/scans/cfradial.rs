@@ -8,7 +8,7 @@ use super::gate_layout::GateLayout;
 use super::grid::{RayRow, mean_count, of_mean, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
-use crate::io::netcdf_input::NetcdfFile;
+use crate::io::netcdf_input::{NetcdfFile, quoted};
 use crate::io::units::Quantity;
 use crate::io::variable::{
     self, AZIMUTH, ELEVATION, NYQUIST, PULSE_WIDTH, RANGE, RATIO, SIGMA, TRANSITION, Times,
@@ -20,6 +20,10 @@ use std::path::Path;
 
 /// Whether a Windcube trusts a velocity; its times are those of the ends of rays.
 const STATUS: &str = "radial_wind_speed_status";
+/// Words of flags of velocities that are trusted.
+const TRUSTED: [&str; 7] = [
+    "good", "valid", "ok", "trusted", "reliable", "accepted", "usable",
+];
 /// Nyquist velocities that differ by less than this fraction are one.
 const ONE_NYQUIST: f64 = 1e-3;
 
@@ -351,8 +355,8 @@ fn velocities_m_s(
     };
     // A fraction of realisations, or 0 and 1.
     let flagged = status_of("flagged")?;
-    // 1 where the instrument trusts its velocity.
     let status = status_of(STATUS)?;
+    let trusted = trusted_values(file)?;
     let ratio_db = match (format.min_snr_db, variable::find(file, &RATIO)) {
         (None, _) => None,
         (Some(_), Some(name)) => Some(layout.spread(name, variable::ratio_db(file, name)?)?),
@@ -363,7 +367,9 @@ fn velocities_m_s(
             .as_ref()
             .is_some_and(|ratios_db| format.is_noise(ratios_db[at]))
             || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
-            || status.as_ref().is_some_and(|status| status[at] != 1.0);
+            || status
+                .as_ref()
+                .is_some_and(|status| !trusted.contains(&status[at]));
         *value = if is_noise {
             f64::NAN
         } else {
@@ -371,6 +377,30 @@ fn velocities_m_s(
         };
     }
     Ok(velocity_m_s)
+}
+
+/// Values of the status where the instrument trusts its velocity: those that the file calls so, or else 1.
+fn trusted_values(file: &NetcdfFile) -> Result<Vec<f64>, String> {
+    let values = file.numbers(STATUS, "flag_values");
+    let (Some(values), Some(meanings)) = (values, file.text(STATUS, "flag_meanings")) else {
+        return Ok(vec![1.0]);
+    };
+    let mut trusted = Vec::new();
+    for (value, meaning) in values.iter().zip(meanings.split_whitespace()) {
+        let meaning = meaning.to_lowercase();
+        let mut words = meaning.split(['_', '-']);
+        if words.clone().all(|word| word != "not") && words.any(|word| TRUSTED.contains(&word)) {
+            trusted.push(*value);
+        }
+    }
+    if trusted.is_empty() {
+        return Err(format!(
+            "{STATUS} has flag_meanings = {}: none of {} among them",
+            quoted(meanings),
+            TRUSTED.join(", ")
+        ));
+    }
+    Ok(trusted)
 }
 
 /// Standard deviations of the velocities, m/s, if the file has them; of means over scans as many as it counts.

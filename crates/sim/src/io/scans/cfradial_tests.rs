@@ -49,10 +49,14 @@ impl Made {
             globals: Vec::new(),
             variables,
         };
-        let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), layout.into_bytes(&example()).unwrap()).unwrap();
-        open(file.path()).unwrap()
+        opened(layout)
     }
+}
+
+fn opened(layout: netcdf::Layout) -> NetcdfFile {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), layout.into_bytes(&example()).unwrap()).unwrap();
+    open(file.path()).unwrap()
 }
 
 const RAYS: usize = 12;
@@ -257,6 +261,27 @@ fn each_ray_has_its_own_nyquist_velocity() {
     // Every other ray; 18 velocities of each are too few for a scan, 30 are enough.
     let in_turn = (0..RAYS).map(|ray| if ray % 6 == 5 { 1000.0 } else { 3000.0 });
     assert_eq!(folds(RAYS as u64, in_turn.collect()), [(5, Some(60.0)); 2]);
+}
+
+#[test]
+fn a_status_tells_which_of_its_values_are_trusted() {
+    let trusted = |meanings: &str| {
+        let status = netcdf::Variable::new(STATUS, &["gate"], Data::i8(vec![0; 3]));
+        trusted_values(&opened(netcdf::Layout {
+            dims: vec![("gate", 3)],
+            globals: Vec::new(),
+            variables: vec![
+                status
+                    .attr("flag_values", Data::i8([0, 1, 2]))
+                    .text("flag_meanings", meanings),
+            ],
+        }))
+    };
+    assert_eq!(trusted("good bad not_valid"), Ok(vec![0.0]));
+    assert_eq!(trusted("bad valid_data Good"), Ok(vec![1.0, 2.0]));
+    let refused = trusted("a b c").unwrap_err();
+    assert!(refused.contains("flag_meanings = \"a b c\""), "{refused}");
+    assert_eq!(trusted_values(&made().open()), Ok(vec![1.0]));
 }
 
 #[test]

@@ -16,6 +16,8 @@ const IMPOSSIBLE: f64 = 0.1;
 
 /// Cosine of the elevation below which a beam counts as vertical.
 const VERTICAL: f64 = 0.02;
+/// Azimuths that count several turns are at most this in size.
+const MOST_AZIMUTH_RAD: f64 = 2.0 * std::f64::consts::TAU;
 
 /// One line of sight with the velocities of its gates.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -131,6 +133,10 @@ fn check(sweeps: &mut [RaySweep]) -> Result<Option<String>, String> {
             if ray.elevation_rad > 1.5 * std::f64::consts::PI {
                 ray.elevation_rad -= std::f64::consts::TAU;
             }
+            // A fill value that the file does not name.
+            if ray.azimuth_rad.abs() > MOST_AZIMUTH_RAD {
+                ray.azimuth_rad = f64::NAN;
+            }
             // Straight up all azimuths are one.
             if ray.azimuth_rad.is_nan() && ray.elevation_rad.cos().abs() < VERTICAL {
                 ray.azimuth_rad = 0.0;
@@ -181,4 +187,30 @@ fn check(sweeps: &mut [RaySweep]) -> Result<Option<String>, String> {
             all - kept
         )
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_with_an_azimuth_that_no_beam_has_are_skipped() {
+        let ray = |azimuth_deg: f64| Ray {
+            azimuth_rad: azimuth_deg.to_radians(),
+            elevation_rad: 0.5,
+            range_m: vec![100.0, 200.0],
+            velocity_m_s: vec![1.0, 2.0],
+            ..Ray::default()
+        };
+        let mut sweeps = [RaySweep {
+            rays: [0.0, -999.0, 400.0, -170.0, 1e20].map(ray).into(),
+            ..RaySweep::default()
+        }];
+        let warning = check(&mut sweeps).unwrap().unwrap();
+        assert!(
+            warning.starts_with("2 of 5 rays have no azimuth"),
+            "{warning}"
+        );
+        assert_eq!(sweeps[0].rays.len(), 3);
+    }
 }
