@@ -1,8 +1,9 @@
 //! Biased correlogram of a weighted window, the statistic that is accumulated.
 //!
 //! Computes r_m = (1 / sum h^2) sum over n of h(n+m) s(n+m) h(n) conj(s(n)) for m = 0 .. N-1, by two transforms of 2 N
-//! points, the second of the sum of the power spectra of all records. Its Fourier transform with all lags is the zero-padded periodogram (29), corrected,
-//! at every frequency, so PA and CA share it. Check: against the sum written out, and that identity to 1e-12.
+//! points, the second of the sum of the power spectra of all records. Its Fourier transform with all lags is the
+//! zero-padded periodogram (29), corrected, at every frequency, so PA and CA share it. Check: against the sum written
+//! out, and that identity to 1e-12.
 //!
 //! With several weightings (tapers) it is the weighted sum of their correlograms.
 

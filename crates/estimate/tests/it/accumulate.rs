@@ -712,3 +712,14 @@ fn products_that_do_not_fit_are_refused() {
             .contains("sum of records")
     );
 }
+
+#[test]
+fn records_are_not_added_to_products() {
+    let statistic = plan().statistic;
+    let geometry = ScanGeometry::regular(&table_2(), &gates(), &[0.0], 4, SAMPLES).unwrap();
+    let mut sums = ScanSums::new(&statistic, &gates(), geometry, SAMPLES).unwrap();
+    sums.add_products(0, &[Array2::ones((SAMPLES, 64))])
+        .unwrap();
+    let refused = sums.add(0, Array2::ones((1, SAMPLES)).view()).unwrap_err();
+    assert!(refused.to_string().contains("not to products"), "{refused}");
+}

@@ -115,10 +115,12 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     /// The rays of a line must come in their order. Windows with a missing sample are left out.
     ///
     /// # Errors
-    /// [`Error::Length`] for records of another length.
+    /// [`Error::Length`] for records of another length; [`Error::OutOfRange`] after products.
     pub fn add(&mut self, first_ray: usize, records: ArrayView2<'_, S>) -> Result<(), Error> {
         let (rays, samples) = records.dim();
         length("samples of a record", self.record_samples, samples)?;
+        let allowed = "added to records alone, not to products";
+        check("rays", rays as f64, allowed, !self.of_products)?;
         let scale = self.rescale(records);
         let gates = &self.gates;
         let rule = &self.rule;

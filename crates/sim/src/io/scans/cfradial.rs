@@ -356,7 +356,10 @@ fn velocities_m_s(
     // A fraction of realisations, or 0 and 1.
     let flagged = status_of("flagged")?;
     let status = status_of(STATUS)?;
-    let trusted = trusted_values(file)?;
+    let trusted = match status {
+        Some(_) => trusted_values(file)?,
+        None => Vec::new(),
+    };
     let ratio_db = match (format.min_snr_db, variable::find(file, &RATIO)) {
         (None, _) => None,
         (Some(_), Some(name)) => Some(layout.spread(name, variable::ratio_db(file, name)?)?),

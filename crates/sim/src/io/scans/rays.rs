@@ -123,6 +123,21 @@ fn of_text(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<FoundRays, 
     }
 }
 
+/// Counts elevations below the horizon from it, and takes azimuths that no beam has for missing ones.
+fn correct_angles(ray: &mut Ray) {
+    if ray.elevation_rad > 1.5 * std::f64::consts::PI {
+        ray.elevation_rad -= std::f64::consts::TAU;
+    }
+    // A fill value that the file does not name.
+    if ray.azimuth_rad.abs() > MOST_AZIMUTH_RAD {
+        ray.azimuth_rad = f64::NAN;
+    }
+    // Straight up all azimuths are one.
+    if ray.azimuth_rad.is_nan() && ray.elevation_rad.cos().abs() < VERTICAL {
+        ray.azimuth_rad = 0.0;
+    }
+}
+
 /// Removes what no line of sight has, in words; elevations below the horizon may count on from 270 degrees.
 fn check(sweeps: &mut [RaySweep]) -> Result<Option<String>, String> {
     let all: usize = sweeps.iter().map(|sweep| sweep.rays.len()).sum();
@@ -130,17 +145,7 @@ fn check(sweeps: &mut [RaySweep]) -> Result<Option<String>, String> {
     let mut count = 0;
     for sweep in sweeps.iter_mut() {
         for ray in &mut sweep.rays {
-            if ray.elevation_rad > 1.5 * std::f64::consts::PI {
-                ray.elevation_rad -= std::f64::consts::TAU;
-            }
-            // A fill value that the file does not name.
-            if ray.azimuth_rad.abs() > MOST_AZIMUTH_RAD {
-                ray.azimuth_rad = f64::NAN;
-            }
-            // Straight up all azimuths are one.
-            if ray.azimuth_rad.is_nan() && ray.elevation_rad.cos().abs() < VERTICAL {
-                ray.azimuth_rad = 0.0;
-            }
+            correct_angles(ray);
             if ray.elevation_rad.is_finite() && !ALLOWED_RAD.contains(&ray.elevation_rad) {
                 impossible = impossible.or(Some(ray.elevation_rad));
                 count += 1;
