@@ -651,8 +651,11 @@ fn text(found: &[RetrievedScan]) -> String {
                 (true, false) => format!("{:.1} m^2/s, its error unknown,", mean.value),
                 (true, true) => format!("{:.1} +- {:.1} m^2/s", mean.value, mean.std),
             };
-            let [y, z] = [vortex.lateral_position_m, vortex.height_m]
-                .map(|m| format!("{:.2} +- {:.2} m", m.value, m.std));
+            let [y, z] =
+                [vortex.lateral_position_m, vortex.height_m].map(|m| match m.std.is_finite() {
+                    true => format!("{:.2} +- {:.2} m", m.value, m.std),
+                    false => format!("{:.2} m", m.value),
+                });
             let side = retrieve::name(vortex.side);
             out +=
                 &format!("{name}: {side:<5} Gamma(5-15 m) {circulation} at y {y}, z {z}{flags}\n");

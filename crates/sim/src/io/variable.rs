@@ -10,6 +10,8 @@ use super::UtcTime;
 use super::csv_input::TextTable;
 use super::netcdf_input::{NetcdfFile, quoted};
 use super::units::{Quantity, split_date};
+use super::utc::DAY_S;
+use netcdf_reader::NcType;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
 
@@ -26,6 +28,8 @@ pub(crate) trait VariableSource {
     /// # Errors
     /// A variable that cannot be read or is not made of numbers.
     fn numbers(&self, name: &str) -> Result<Vec<f64>, String>;
+    /// Whether the numbers of a variable have 32 bits.
+    fn is_single(&self, name: &str) -> bool;
     /// The texts of a variable.
     ///
     /// # Errors
@@ -51,6 +55,10 @@ impl VariableSource for NetcdfFile {
     fn numbers(&self, name: &str) -> Result<Vec<f64>, String> {
         self.refuse_other_packing(name)?;
         self.floats(name)
+    }
+
+    fn is_single(&self, name: &str) -> bool {
+        matches!(self.kind(name), Some(NcType::Float))
     }
 
     fn texts(&self, name: &str) -> Result<Vec<String>, String> {
@@ -81,6 +89,10 @@ impl VariableSource for TextTable {
         Ok((0..self.rows.len())
             .map(|row| self.number(row, column))
             .collect())
+    }
+
+    fn is_single(&self, _: &str) -> bool {
+        false
     }
 
     fn texts(&self, name: &str) -> Result<Vec<String>, String> {
@@ -458,6 +470,11 @@ pub(crate) fn is_towards(source: &dyn VariableSource, name: &str) -> bool {
     said == Some(true)
 }
 
+/// Whether the standard name of velocities says that they are positive away from the instrument.
+pub(crate) fn is_away(source: &dyn VariableSource, name: &str) -> bool {
+    source.attribute(name, "standard_name") == Some(AWAY)
+}
+
 /// Whether a remark says that velocities are positive towards the instrument or negative away from it; none where it says nothing of it.
 ///
 /// A sign stands before its direction ("positive values are towards the lidar") or behind it in a clause ("away is positive").
@@ -528,6 +545,8 @@ pub(crate) struct Times {
     pub(crate) reference: Option<UtcTime>,
     /// What of them was not understood.
     pub(crate) not_understood: Option<String>,
+    /// That they are rounded so far that they do not tell rays apart, in words.
+    pub(crate) rounded: Option<String>,
 }
 
 impl Times {
@@ -536,6 +555,7 @@ impl Times {
             time_s: vec![f64::NAN; count],
             reference: None,
             not_understood,
+            rounded: None,
         }
     }
 
@@ -555,12 +575,17 @@ impl Times {
             time_s,
             reference: Some(reference),
             not_understood: None,
+            rounded: None,
         }
     }
 }
 
 /// Seconds of some hundred years, which are counted from a later date.
 const FAR_S: f64 = 4e9;
+/// Times that are rounded to more than this tell no rays apart, s.
+const COARSE_S: f64 = 1.0;
+/// Times of a day begin anew where they fall by a day less at most this, s.
+const PAUSE_S: f64 = 3600.0;
 
 /// The times of `count` rays, one for each or one for all; unknown ones where the file has none or says them in words that are not understood.
 ///
@@ -621,15 +646,51 @@ fn times_of_numbers(source: &dyn VariableSource, name: &str) -> Result<Times, St
         let why = not_understood(name, said.trim());
         return Ok(Times::unknown(numbers.len(), Some(why)));
     };
-    let time_s: Vec<f64> = numbers.into_iter().map(|number| number * unit_s).collect();
-    Ok(match reference {
+    let rounded = match source.is_single(name) && numbers.len() > 1 {
+        true => rounding(name, &numbers, unit_s),
+        false => None,
+    };
+    let mut time_s: Vec<f64> = numbers.into_iter().map(|number| number * unit_s).collect();
+    count_on_after_midnight(&mut time_s);
+    let times = match reference {
         Some(reference) => Times::after(reference, time_s),
         None => Times {
             time_s,
-            reference: None,
-            not_understood: None,
+            ..Times::unknown(0, None)
         },
+    };
+    Ok(Times { rounded, ..times })
+}
+
+/// That numbers of 32 bits in units of `unit_s` are rounded too far, in words.
+fn rounding(name: &str, numbers: &[f64], unit_s: f64) -> Option<String> {
+    let finite = numbers.iter().filter(|number| number.is_finite());
+    let largest = finite.fold(0.0, |largest: f64, number| largest.max(number.abs())) as f32;
+    let step_s = f64::from(largest.next_up() - largest) * unit_s;
+    (step_s > COARSE_S).then(|| {
+        format!(
+            "its times have 32 bits and differ by {step_s:.0} s or not at all ({name}): store them as 64-bit numbers"
+        )
     })
+}
+
+/// Adds the days to times of a day that begin anew after midnight. Times that fall by other steps are in no order, and stay.
+fn count_on_after_midnight(time_s: &mut [f64]) {
+    let mut falls = time_s.windows(2).map(|pair| pair[0] - pair[1]);
+    let are_ordered = falls.all(|fall_s| !(PAUSE_S..=DAY_S - PAUSE_S).contains(&fall_s));
+    let are_of_a_day = time_s.iter().all(|time_s| (0.0..=DAY_S).contains(time_s));
+    if !(are_ordered && are_of_a_day) {
+        return;
+    }
+    let mut days_s = 0.0;
+    let mut last_s = 0.0;
+    for time_s in time_s {
+        if last_s - *time_s > DAY_S - PAUSE_S {
+            days_s += DAY_S;
+        }
+        last_s = *time_s;
+        *time_s += days_s;
+    }
 }
 
 /// The date from which a variable counts time, with the fraction of a second beyond it: that in its units, or that of a text of the file

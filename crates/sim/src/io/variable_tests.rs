@@ -9,6 +9,7 @@ type Attributes = Vec<(&'static str, &'static str)>;
 struct Given {
     variables: BTreeMap<&'static str, (Attributes, Values)>,
     texts: Vec<(&'static str, &'static str)>,
+    is_single: bool,
 }
 
 enum Values {
@@ -49,6 +50,10 @@ impl VariableSource for Given {
             Values::Numbers(values) => Ok(values.clone()),
             Values::Texts(_) => Err("no numbers".into()),
         }
+    }
+
+    fn is_single(&self, _: &str) -> bool {
+        self.is_single
     }
 
     fn texts(&self, name: &str) -> Result<Vec<String>, String> {
@@ -220,6 +225,45 @@ fn times_count_from_any_date_of_the_file() {
     let plain = Given::numbers("time", &[("units", "s")], &[7.0]);
     let plain = times(&plain, 1).unwrap();
     assert_eq!((plain.reference, plain.time_s), (None, vec![7.0]));
+}
+
+#[test]
+fn times_of_a_day_go_on_after_midnight() {
+    let found = |units: &'static str, stored: &[f64]| {
+        let file = Given::numbers("time", &[("units", units)], stored);
+        times(&file, stored.len()).unwrap().time_s
+    };
+    let seconds = "seconds since 2024-01-31";
+    let day_s = [86_399.0, 86_399.5, 0.0, 0.5];
+    assert_eq!(
+        found(seconds, &day_s),
+        [86_399.0, 86_399.5, 86_400.0, 86_400.5]
+    );
+    let hours = found("hours since 2024-01-31", &day_s.map(|s| s / 3600.0));
+    assert!((hours[3] - 86_400.5).abs() < 1e-6);
+    // In another order, and of more than a day.
+    let shuffled = [86_399.0, 0.0, 40_000.0, 20_000.0];
+    assert_eq!(found(seconds, &shuffled), shuffled);
+    let long = [86_399.0, 86_401.0, 0.0];
+    assert_eq!(found(seconds, &long), long);
+}
+
+#[test]
+fn times_of_32_bits_that_do_not_tell_rays_apart_are_named() {
+    for (units, stored, step_s) in [
+        ("seconds since 1970-01-01", 1.7e9, Some("128 s")),
+        ("days since 1970-01-01", 19_675.5, Some("169 s")),
+        ("seconds since 2024-01-31", 60_000.0, None),
+    ] {
+        let mut file = Given::numbers("time", &[("units", units)], &[stored; 2]);
+        assert_eq!(times(&file, 2).unwrap().rounded, None);
+        file.is_single = true;
+        let rounded = times(&file, 2).unwrap().rounded;
+        match step_s {
+            Some(step_s) => assert!(rounded.is_some_and(|text| text.contains(step_s)), "{units}"),
+            None => assert_eq!(rounded, None),
+        }
+    }
 }
 
 #[test]

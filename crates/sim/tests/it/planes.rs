@@ -334,6 +334,7 @@ fn files_of_a_day_that_cannot_be_used_are_skipped_with_the_reason() {
     )
     .unwrap();
     fs::write(folder.join("empty.csv"), "").unwrap();
+    fs::write(folder.join("copy.hpl"), &whole).unwrap();
     let (table, warned) = retrieved(
         folder,
         &[
@@ -341,6 +342,8 @@ fn files_of_a_day_that_cannot_be_used_are_skipped_with_the_reason() {
             "cut.hpl",
             "ray.csv",
             "b.csv",
+            "b.csv",
+            "copy.hpl",
             "ppi.hpl",
             "empty.csv",
             "few.csv",
@@ -356,10 +359,12 @@ fn files_of_a_day_that_cannot_be_used_are_skipped_with_the_reason() {
         "few.csv: sweep 0: ",
         "b.csv: its times count from no date, those of other files do",
         "few.csv: its times count from no date",
+        "b.csv: it is a copy of b.csv",
+        "copy.hpl: it is a copy of a.hpl",
     ] {
         assert!(warned.contains(part), "{part}: {warned}");
     }
-    assert_eq!(warned.lines().count(), 7, "{warned}");
+    assert_eq!(warned.lines().count(), 9, "{warned}");
     // Nothing is left, or a file is not there at all.
     for (files, part) in [
         (["cut.hpl", "ppi.hpl"], "cut.hpl: it is cut short"),

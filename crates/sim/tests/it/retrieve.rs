@@ -759,7 +759,7 @@ fn what_is_no_map_is_refused_and_nothing_is_written() {
         ("planes.csv", &["planes.csv", "azimuths"]),
         ("cut.hpl", &["cut.hpl", "cut short", "gates"]),
         ("gates.hpl", &["gates.hpl", "number of gates"]),
-        ("rays.hpl", &["rays.hpl", "2 of 9 rays"]),
+        ("rays.hpl", &["rays.hpl", "2 different elevations"]),
         ("twice.csv --method signals", &["raw signals"]),
         ("masked.csv --turbulence 1", &["--turbulence", "1.2,25"]),
     ] {

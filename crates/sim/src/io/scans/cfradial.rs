@@ -26,6 +26,8 @@ const TRUSTED: [&str; 7] = [
 ];
 /// Nyquist velocities that differ by less than this fraction are one.
 const ONE_NYQUIST: f64 = 1e-3;
+/// Ranges farther than this fraction of a gate from the middles of its bounds are not those of its middle.
+const SAME_MIDDLE: f64 = 0.01;
 
 /// The scans of a file or a group, and what was skipped; `sweep` is the number of its first sweep.
 pub(super) fn scans(
@@ -38,6 +40,11 @@ pub(super) fn scans(
     let velocity = VelocityVariable::new(file, format)?;
     let mut rays = Rays::read(file, format, &velocity, range_m.len())?;
     turn_falling(&mut range_m, &mut rays.rows);
+    if let Some(text) = rays.rounded {
+        rays.rows.iter_mut().for_each(|row| row.time_s = f64::NAN);
+        let without = "its scans have no times and are in no track";
+        rays.warnings.push(format!("{text}; {without}"));
+    }
     let pulse_width_s = pulse_width(file)?;
     let place_deg = place(file)?;
     let scene_toml = scene_of(file, &velocity);
@@ -130,6 +137,7 @@ pub(super) fn rays(
             rays: own,
         });
     }
+    rays.warnings.extend(rays.rounded);
     Ok((sweeps, rays.warnings))
 }
 
@@ -239,6 +247,8 @@ struct Rays {
     /// Scans of which velocities are means.
     scans: f64,
     warnings: Vec<String>,
+    /// That times do not tell rays apart, in words.
+    rounded: Option<String>,
 }
 
 impl Rays {
@@ -296,6 +306,7 @@ impl Rays {
             reference: times.reference,
             scans: mean_count(counts.iter().flatten().copied()),
             warnings: times.not_understood.into_iter().collect(),
+            rounded: times.rounded,
         })
     }
 }
@@ -438,6 +449,11 @@ impl VelocityVariable {
                 .map(str::to_owned)
                 .ok_or_else(|| no_velocity(file))?,
         };
+        if format.towards && variable::is_away(file, &name) {
+            return Err(format!(
+                "--towards: the standard name of its variable {name} says that velocities are positive away from the lidar"
+            ));
+        }
         let is_towards = variable::is_towards(file, &name) || format.towards;
         let is_mean = file
             .text(&name, "cell_methods")
@@ -472,9 +488,44 @@ fn ranges(file: &NetcdfFile) -> Result<Vec<f64>, String> {
     shape.retain(|length| *length != 1);
     match shape[..] {
         [_, gates] => same_rows(name, &range_m, gates as usize),
-        [] | [_] => Ok(range_m),
+        [] | [_] => within_bounds(file, name, range_m),
         _ => Err(format!("variable {name} has more than two dimensions")),
     }
+}
+
+/// The middles of gates whose edges the file has (the attribute `bounds` of CF), where its ranges are others, such as those of their
+/// starts.
+///
+/// # Errors
+/// Bounds of another number of gates.
+fn within_bounds(file: &NetcdfFile, name: &str, range_m: Vec<f64>) -> Result<Vec<f64>, String> {
+    let Some(bounds) = file.text(name, "bounds").filter(|name| file.has(name)) else {
+        return Ok(range_m);
+    };
+    // Edges have the unit of their ranges.
+    let unit_m = file.unit(name, Quantity::Length)?;
+    let edges = file.floats(bounds)?;
+    if edges.len() != 2 * range_m.len() {
+        return Err(format!(
+            "{bounds}, the bounds of {name}, has {} values; two for each of {} gates are needed",
+            edges.len(),
+            range_m.len()
+        ));
+    }
+    let mut middles_m = Vec::with_capacity(range_m.len());
+    let mut is_off = false;
+    for (range_m, edges) in range_m.iter().zip(edges.chunks_exact(2)) {
+        let middle_m = 0.5 * unit_m * (edges[0] + edges[1]);
+        let length_m = unit_m * (edges[1] - edges[0]).abs();
+        is_off |= (middle_m - range_m).abs() > SAME_MIDDLE * length_m;
+        middles_m.push(middle_m);
+    }
+    let are_known = middles_m.iter().all(|middle_m| middle_m.is_finite());
+    Ok(if is_off && are_known {
+        middles_m
+    } else {
+        range_m
+    })
 }
 
 /// The one row that a variable repeats for each ray; rows without a value are passed over.

@@ -155,6 +155,36 @@ fn rays_without_an_elevation_are_skipped_and_counted() {
 }
 
 #[test]
+fn ranges_of_the_starts_of_gates_follow_their_bounds() {
+    for (start_km, first_m) in [(0.295, 300.0), (0.2999999, 299.9999)] {
+        let mut starts = made();
+        let (shape, _, middles_km) = starts.0.remove("range").unwrap();
+        let edges = middles_km.iter().flat_map(|km| [km - 0.005, km + 0.005]);
+        let edges: Vec<f64> = edges.collect();
+        starts.0.insert(
+            "edges",
+            (vec![GATES as u64, 2], vec![("units", "km")], edges),
+        );
+        let attributes = vec![("units", "km"), ("bounds", "edges")];
+        let own = (0..GATES).map(|i| start_km + 0.01 * i as f64).collect();
+        starts.0.insert("range", (shape, attributes, own));
+        let map = read(&starts).unwrap().0.remove(0).map;
+        assert!((map.range_m[0] - first_m).abs() < 1e-9, "{start_km}");
+        assert!((map.range_m[5] - first_m - 50.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_sign_that_contradicts_the_standard_name_is_refused() {
+    let towards = ScanFormat {
+        towards: true,
+        ..ScanFormat::default()
+    };
+    let refused = scans(&made().open(), Path::new("a.nc"), &towards, 0).err();
+    assert!(refused.is_some_and(|reason| reason.contains("the standard name of its variable VEL")));
+}
+
+#[test]
 fn sign_folds_masks_and_ragged_gates_follow_the_file() {
     let mut towards = made();
     let (shape, _, values) = towards.0.remove("VEL").unwrap();

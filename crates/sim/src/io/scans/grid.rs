@@ -3,7 +3,7 @@
 //! Check: lines of one elevation; what makes no map.
 
 use super::planes::FEWEST_LINES;
-use crate::io::units::FASTEST_M_S;
+use crate::interpolation::interpolate;
 use ndarray::Array2;
 use wakescope_estimate::retrieval::ScanMap;
 
@@ -25,11 +25,12 @@ const FARTHEST_M: f64 = 1e6;
 const NEAREST_M: f64 = 10.0;
 /// Least width of a scan at its farthest gate, m: none of a vortex fits into less.
 const NARROWEST_M: f64 = 5.0;
-/// Velocities of one value beyond this are missing ones, m/s.
-const FAST_M_S: f64 = 90.0;
 /// Fewest gates and velocities of a map.
 const FEWEST_GATES: usize = 3;
 const FEWEST_VELOCITIES: usize = 30;
+
+/// Largest fraction of the lines of a scan that get times from their neighbours.
+const MOST_WITHOUT_TIME: f64 = 0.1;
 
 /// Fewest scans whose scatter gives a standard deviation.
 const ENOUGH_SCANS: f64 = 20.0;
@@ -59,10 +60,11 @@ pub(super) fn mean_count(counts: impl Iterator<Item = f64>) -> f64 {
 /// The map of rays; `what` names the scan in messages.
 pub(super) fn scan_map(
     mut rays: Vec<RayRow>,
-    range_m: Vec<f64>,
+    mut range_m: Vec<f64>,
     fold_m_s: Option<f64>,
     what: &str,
 ) -> Result<ScanMap, String> {
+    drop_empty_gates(&mut rays, &mut range_m);
     check_ranges(&range_m).map_err(|reason| format!("{what}: {reason}"))?;
     let gates = range_m.len();
     rays.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
@@ -89,10 +91,7 @@ pub(super) fn scan_map(
         elevation_rad.push(line[0].elevation_rad);
         time_s.push(finite_mean(line.iter().map(|ray| ray.time_s).collect()));
     }
-    // Of all lines, or of none.
-    if !time_s.iter().all(|time_s| time_s.is_finite()) {
-        time_s.fill(f64::NAN);
-    }
+    fill_times(&elevation_rad, &mut time_s);
     Ok(ScanMap {
         elevation_rad,
         time_s,
@@ -101,6 +100,50 @@ pub(super) fn scan_map(
         sigma_m_s,
         fold_m_s: fold_m_s.filter(|fold| *fold > 0.0 && fold.is_finite()),
     })
+}
+
+/// Gives the few lines without a time one between those of their neighbours; where many have none, no line has.
+fn fill_times(elevation_rad: &[f64], time_s: &mut [f64]) {
+    let mut elevations_rad = Vec::with_capacity(time_s.len());
+    let mut times_s = Vec::with_capacity(time_s.len());
+    for (elevation_rad, time_s) in elevation_rad.iter().zip(&*time_s) {
+        if time_s.is_finite() {
+            elevations_rad.push(*elevation_rad);
+            times_s.push(*time_s);
+        }
+    }
+    let missing = time_s.len() - times_s.len();
+    if missing as f64 > MOST_WITHOUT_TIME * time_s.len() as f64 {
+        time_s.fill(f64::NAN);
+        return;
+    }
+    for (elevation_rad, time_s) in elevation_rad.iter().zip(time_s) {
+        if time_s.is_nan() {
+            *time_s = interpolate(&elevations_rad, &times_s, *elevation_rad);
+        }
+    }
+}
+
+/// Removes gates of unknown range, those at the lidar, and those before it without velocities.
+fn drop_empty_gates(rays: &mut [RayRow], range_m: &mut Vec<f64>) {
+    let mut kept = Vec::with_capacity(range_m.len());
+    for (gate, range_m) in range_m.iter().enumerate() {
+        let has_velocities = || rays.iter().any(|ray| ray.velocity_m_s[gate].is_finite());
+        if *range_m > 0.0 || (*range_m < 0.0 && has_velocities()) {
+            kept.push(gate);
+        }
+    }
+    if kept.len() == range_m.len() {
+        return;
+    }
+    *range_m = kept.iter().map(|gate| range_m[*gate]).collect();
+    for ray in rays {
+        for values in [&mut ray.velocity_m_s, &mut ray.sigma_m_s] {
+            if !values.is_empty() {
+                *values = kept.iter().map(|gate| values[*gate]).collect();
+            }
+        }
+    }
 }
 
 /// Refuses ranges that do not increase or lie beyond what a scene allows.
@@ -154,23 +197,7 @@ fn check_width(lines: &[&[RayRow]], range_m: &[f64]) -> Result<(), String> {
     }
 }
 
-/// What is wrong with velocities that no air has: too large ones, and large ones of one value, which stands for a missing one.
-pub(super) fn no_velocity(velocities_m_s: impl Iterator<Item = f64>) -> Option<String> {
-    const CURE: &str =
-        "its unit must be m/s, and a missing one its fill value, in a table an empty cell";
-    let mut fast: Vec<f64> = velocities_m_s.filter(|v| v.abs() >= FAST_M_S).collect();
-    if let Some(bad) = fast.iter().find(|v| v.abs() > FASTEST_M_S) {
-        return Some(format!("a velocity is {bad} m/s: {CURE}"));
-    }
-    fast.sort_by(f64::total_cmp);
-    let same = fast.windows(2).find(|pair| pair[0] == pair[1])?;
-    Some(format!(
-        "a velocity is {} m/s in more than one gate: {CURE}",
-        same[0]
-    ))
-}
-
-/// Refuses too few velocities, and such as no wind has.
+/// Refuses too few velocities.
 fn check_velocities(velocity_m_s: &Array2<f64>) -> Result<(), String> {
     let values = velocity_m_s
         .iter()
@@ -184,10 +211,7 @@ fn check_velocities(velocity_m_s: &Array2<f64>) -> Result<(), String> {
             ),
         });
     }
-    match no_velocity(velocity_m_s.iter().copied()) {
-        Some(reason) => Err(reason),
-        None => Ok(()),
-    }
+    Ok(())
 }
 
 /// Standard deviations of the velocities of lines, if rays have them; velocities of unknown standard deviation become missing.
@@ -256,6 +280,42 @@ mod tests {
     }
 
     #[test]
+    fn few_lines_without_a_time_get_one_from_their_neighbours() {
+        let mut lines = rays((0..20).map(|i| 0.1 + 0.01 * f64::from(i)));
+        lines[7].time_s = f64::NAN;
+        lines[8].time_s = f64::NAN;
+        let map = scan_map(lines.clone(), range_m(), None, "it").unwrap();
+        for (line, time_s) in map.time_s.iter().enumerate() {
+            assert!((time_s - line as f64).abs() < 1e-9, "{line}: {time_s}");
+        }
+        lines[12].time_s = f64::NAN;
+        let map = scan_map(lines, range_m(), None, "it").unwrap();
+        assert!(map.time_s.iter().all(|time_s| time_s.is_nan()));
+    }
+
+    #[test]
+    fn gates_that_see_no_air_are_left_out() {
+        let mut ranges = range_m();
+        ranges[0] = -5.0;
+        ranges[1] = 0.0;
+        ranges[11] = f64::NAN;
+        let mut lines = rays([0.1, 0.2, 0.3, 0.4]);
+        for ray in &mut lines {
+            ray.sigma_m_s = vec![0.5; 12];
+            ray.velocity_m_s = (0..12).map(f64::from).collect();
+        }
+        let refused = scan_map(lines.clone(), ranges.clone(), None, "it").unwrap_err();
+        assert!(refused.contains("range must be at least 0 m"), "{refused}");
+        lines
+            .iter_mut()
+            .for_each(|ray| ray.velocity_m_s[0] = f64::NAN);
+        let map = scan_map(lines, ranges.clone(), None, "it").unwrap();
+        assert_eq!(map.range_m, ranges[2..11]);
+        assert_eq!(map.velocity_m_s.row(0).to_vec()[..2], [2.0, 3.0]);
+        assert_eq!(map.sigma_m_s.unwrap().dim(), (4, 9));
+    }
+
+    #[test]
     fn what_is_no_scan_is_refused_by_name() {
         let refused = |rays: Vec<RayRow>, range_m: Vec<f64>| {
             scan_map(rays, range_m, None, "sweep 3").unwrap_err()
@@ -275,18 +335,7 @@ mod tests {
         missing
             .iter_mut()
             .for_each(|ray| ray.velocity_m_s = vec![f64::NAN; 12]);
-        assert!(refused(missing.clone(), range_m()).contains("all of its velocities are missing"));
-        missing
-            .iter_mut()
-            .for_each(|ray| ray.velocity_m_s = vec![-9999.0; 12]);
-        assert!(refused(missing.clone(), range_m()).contains("fill value"));
-        missing
-            .iter_mut()
-            .for_each(|ray| ray.velocity_m_s = (0..12).map(f64::from).collect());
-        missing[1].velocity_m_s[7] = -99.0;
-        assert!(scan_map(missing.clone(), range_m(), None, "it").is_ok());
-        missing[2].velocity_m_s[3] = -99.0;
-        assert!(refused(missing, range_m()).contains("-99 m/s in more than one gate"));
+        assert!(refused(missing, range_m()).contains("all of its velocities are missing"));
     }
 
     #[test]

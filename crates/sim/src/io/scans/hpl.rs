@@ -2,7 +2,7 @@
 //!
 //! The header says how gates lie, and not always truly: files of overlapping gates print the formula of gates that touch, so that
 //! the scan type decides. Noise has velocities over the whole band; it is recognised by its intensity.
-//! Check: a map written by this program comes back; each dialect; files that are cut short.
+//! Check: a map written by this program comes back; each dialect; files that are cut short, and scans that were stopped.
 
 use super::grid::{RayRow, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
@@ -31,6 +31,8 @@ struct Header {
     second_of_day: Option<f64>,
     /// What its date is, if it is none.
     not_understood: Option<String>,
+    /// That it has fewer rays than it states, as of a scan that was stopped.
+    too_few_rays: Option<String>,
     /// Whether this program wrote it.
     is_own: bool,
 }
@@ -45,14 +47,14 @@ fn parse(text: &str, format: &ScanFormat) -> Result<(Header, Vec<RayRow>), Strin
         }
         head.push(line.trim());
     }
-    let header = Header::new(&head)?;
+    let mut header = Header::new(&head)?;
     let lines: Vec<(usize, &str)> = lines.filter(|(_, line)| !line.trim().is_empty()).collect();
     let (mut rays, intensities) = rays(&header, &lines)?;
     check_intensities(&intensities)?;
     if let Some(stated) = header.rays.filter(|stated| *stated > rays.len()) {
-        return Err(format!(
-            "it is cut short: it has {} of {stated} rays",
-            rays.len()
+        let found = rays.len();
+        header.too_few_rays = Some(format!(
+            "it has {found} of the {stated} rays that its header states"
         ));
     }
     mask_noise(&mut rays, &intensities, format);
@@ -87,7 +89,8 @@ pub(super) fn rays_of_text(
         rays,
         ..RaySweep::default()
     };
-    Ok((vec![sweep], header.not_understood.into_iter().collect()))
+    let warnings = header.not_understood.into_iter().chain(header.too_few_rays);
+    Ok((vec![sweep], warnings.collect()))
 }
 
 /// The scans of a text.
@@ -113,6 +116,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
         }
     }
     found.warnings.extend(header.not_understood);
+    found.warnings.extend(header.too_few_rays);
     Ok(found)
 }
 
@@ -222,6 +226,7 @@ impl Header {
             not_understood: stated
                 .filter(|_| start.is_none())
                 .map(|text| not_understood("Start time", text)),
+            too_few_rays: None,
             is_own: lines.contains(&crate::io::hpl::SYSTEM_ID),
         })
     }
@@ -466,6 +471,21 @@ mod tests {
         assert_eq!(date(&[opened_before, after]), "2024-01-31T00:00:00Z");
         let opened_after = ("20240131 23:59:00.00", "20240201 0:00:0.5");
         assert_eq!(date(&[opened_after]), "2024-01-31T23:59:24Z");
+    }
+
+    #[test]
+    fn a_scan_that_was_stopped_is_read_and_a_ray_that_ends_early_is_not() {
+        let stopped = file(&[("rays in file:\t6", "rays in file:\t60")]);
+        let found = scans(&stopped, Path::new("x.hpl"), &ScanFormat::default()).unwrap();
+        assert_eq!(found.scans.len(), 1);
+        assert!(
+            found.warnings[0].contains("6 of the 60 rays"),
+            "{:?}",
+            found.warnings
+        );
+        let end = stopped.trim_end().rfind('\n').unwrap();
+        let cut = scans(&stopped[..end], Path::new("x.hpl"), &ScanFormat::default());
+        assert!(cut.is_err_and(|reason| reason.contains("ray 6 has 7 of 8 gates")));
     }
 
     #[test]

@@ -16,6 +16,7 @@ mod planes;
 mod rays;
 mod store;
 mod table;
+mod velocities;
 
 pub use planes::{are_of_one_plane, face_alike, plane_numbers};
 pub use rays::{Ray, RaySweep, read_rays};

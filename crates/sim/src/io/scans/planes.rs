@@ -8,6 +8,7 @@
 
 use super::ReadScan;
 use super::grid::RayRow;
+use super::velocities::drop_missing;
 use ndarray::s;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 use std::ops::Range;
@@ -183,7 +184,7 @@ impl<'r> Run<'r> {
 /// The scans of rays in the order in which they were measured.
 ///
 /// # Errors
-/// Elevations that are impossible, as of another unit; rays of all azimuths.
+/// Elevations or velocities that are impossible, as of another unit; rays of all azimuths.
 pub(super) fn in_order(rays: Vec<RayRow>) -> Result<Split, String> {
     split(rays, |rays| {
         runs(rays).iter().flat_map(Run::scans).collect()
@@ -193,7 +194,7 @@ pub(super) fn in_order(rays: Vec<RayRow>) -> Result<Split, String> {
 /// The scans of rays in any order, one for each plane.
 ///
 /// # Errors
-/// Elevations that are impossible, as of another unit; rays of all azimuths.
+/// Elevations or velocities that are impossible, as of another unit; rays of all azimuths.
 pub(super) fn in_any_order(rays: Vec<RayRow>) -> Result<Split, String> {
     split(rays, by_plane)
 }
@@ -205,6 +206,8 @@ fn split(
 ) -> Result<Split, String> {
     let mut skipped = Vec::new();
     skipped.extend(drop_impossible(&mut rays)?);
+    let velocities = rays.iter_mut().map(|ray| ray.velocity_m_s.as_mut_slice());
+    skipped.extend(drop_missing(&mut velocities.collect::<Vec<_>>())?);
     let count = rays.len();
     let azimuths = azimuths_degrees(&rays);
     let scans = find(&rays);

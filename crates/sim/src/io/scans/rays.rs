@@ -3,8 +3,9 @@
 //!
 //! Check: files of all formats with cones, stares and gates that differ from ray to ray; what no ray of a lidar has.
 
-use super::grid::{check_extent, no_velocity};
+use super::grid::check_extent;
 use super::planes::ALLOWED_RAD;
+use super::velocities::drop_missing;
 use super::{ScanFormat, Text, cfradial, hpl, table};
 use crate::Error;
 use crate::io::netcdf_input::open_groups;
@@ -139,7 +140,8 @@ fn correct_angles(ray: &mut Ray) {
 }
 
 /// Removes what no line of sight has, in words; elevations below the horizon may count on from 270 degrees.
-fn check(sweeps: &mut [RaySweep]) -> Result<Option<String>, String> {
+fn check(sweeps: &mut [RaySweep]) -> Result<Vec<String>, String> {
+    let mut dropped = Vec::new();
     let all: usize = sweeps.iter().map(|sweep| sweep.rays.len()).sum();
     let mut impossible = None;
     let mut count = 0;
@@ -164,34 +166,47 @@ fn check(sweeps: &mut [RaySweep]) -> Result<Option<String>, String> {
         ));
     }
     let kept: usize = sweeps.iter().map(|sweep| sweep.rays.len()).sum();
+    if kept == 0 {
+        return Err("it has no ray with an azimuth and an elevation".into());
+    }
+    if kept < all {
+        dropped.push(format!(
+            "{} of {all} rays have no azimuth, or no elevation from -90 to 180 degrees",
+            all - kept
+        ));
+    }
+    let mut lines_m_s = Vec::with_capacity(kept);
+    for ray in sweeps.iter_mut().flat_map(|sweep| &mut sweep.rays) {
+        lines_m_s.push(ray.velocity_m_s.as_mut_slice());
+    }
+    dropped.extend(drop_missing(&mut lines_m_s)?);
+    check_gates(sweeps)?;
+    for text in &mut dropped {
+        text.push_str(": skipped");
+    }
+    Ok(dropped)
+}
+
+/// Refuses ranges before the lidar or in another unit, and rays without any velocity.
+fn check_gates(sweeps: &[RaySweep]) -> Result<(), String> {
     let mut velocities = 0;
     let mut farthest_m = f64::NEG_INFINITY;
     for ray in sweeps.iter().flat_map(|sweep| &sweep.rays) {
         for (range_m, velocity_m_s) in ray.range_m.iter().zip(&ray.velocity_m_s) {
+            farthest_m = farthest_m.max(*range_m);
+            if !velocity_m_s.is_finite() {
+                continue;
+            }
             if *range_m < 0.0 {
                 return Err(format!("range is {range_m} m: at least 0 m is needed"));
             }
-            farthest_m = farthest_m.max(*range_m);
-            velocities += usize::from(range_m.is_finite() && velocity_m_s.is_finite());
+            velocities += usize::from(range_m.is_finite());
         }
-    }
-    if kept == 0 {
-        return Err("it has no ray with an azimuth and an elevation".into());
     }
     if velocities == 0 {
         return Err("all of its velocities are missing".into());
     }
-    check_extent(farthest_m)?;
-    let rays = sweeps.iter().flat_map(|sweep| &sweep.rays);
-    if let Some(reason) = no_velocity(rays.flat_map(|ray| ray.velocity_m_s.iter().copied())) {
-        return Err(reason);
-    }
-    Ok((kept < all).then(|| {
-        format!(
-            "{} of {all} rays have no azimuth, or no elevation from -90 to 180 degrees: skipped",
-            all - kept
-        )
-    }))
+    check_extent(farthest_m)
 }
 
 #[cfg(test)]
@@ -211,10 +226,10 @@ mod tests {
             rays: [0.0, -999.0, 400.0, -170.0, 1e20].map(ray).into(),
             ..RaySweep::default()
         }];
-        let warning = check(&mut sweeps).unwrap().unwrap();
+        let warnings = check(&mut sweeps).unwrap();
         assert!(
-            warning.starts_with("2 of 5 rays have no azimuth"),
-            "{warning}"
+            warnings.len() == 1 && warnings[0].starts_with("2 of 5 rays have no azimuth"),
+            "{warnings:?}"
         );
         assert_eq!(sweeps[0].rays.len(), 3);
     }
