@@ -2,10 +2,12 @@
 //!
 //! Tables of other programs may have a header that is the last comment before a first line of numbers (`numpy.savetxt`), cells
 //! with semicolons, tabs, bars or blanks between them, decimal commas beside separators that are none, blanks around cells, the header
-//! again where files were joined, and empty cells behind the last column.
+//! again where files were joined, a row of units below it, and empty cells behind the last column.
 //! Check: what the writer of tables makes of any text comes back; one table in each of these forms.
 
 use super::netcdf_input::quoted;
+use super::units::is_unit;
+use super::variable::split_unit;
 use super::{Provenance, text_file};
 use crate::Error;
 use std::path::Path;
@@ -55,6 +57,9 @@ impl TextTable {
         let as_written = header.clone();
         for name in &mut header {
             *name = name.trim().to_owned();
+        }
+        if let Some(units) = records.next_if(|row| are_units(row, header.len())) {
+            add_units(&mut header, &units);
         }
         let mut rows = Vec::new();
         for mut row in records {
@@ -148,6 +153,29 @@ fn are_numbers(cells: &[String]) -> bool {
     cells
         .iter()
         .all(|cell| cell.trim().replace(',', ".").parse::<f64>().is_ok())
+}
+
+/// Whether the cells of a row name units of the columns above them: at least two do, and no cell is a number or another word.
+fn are_units(row: &[String], columns: usize) -> bool {
+    let mut units = 0;
+    for cell in row {
+        match cell.trim().trim_matches(['[', ']', '(', ')']) {
+            "" | "-" | "dB" | "UTC" => {}
+            cell if is_unit(cell) => units += 1,
+            _ => return false,
+        }
+    }
+    units >= 2 && row.len() == columns
+}
+
+/// Puts units behind the names of columns that have none.
+fn add_units(header: &mut [String], units: &[String]) {
+    for (name, unit) in header.iter_mut().zip(units) {
+        let unit = unit.trim().trim_matches(['[', ']', '(', ')']);
+        if is_unit(unit) && split_unit(name).1.is_none() {
+            *name = format!("{name} [{unit}]");
+        }
+    }
 }
 
 /// What is between the cells of a row, by the first line of cells, a header or numbers; a blank for one or more blanks or tabs.
@@ -296,6 +324,12 @@ mod tests {
             assert_eq!(numbers, [[1.5, 2.5], [3.0, 4.0]], "{text}");
             assert_eq!(table.rows.len(), 2, "{text}");
         }
+        let united =
+            TextTable::parse("range,el_deg,v,name\n[m],deg,m/s,-\n1.5,2.5,3.5,a\n").unwrap();
+        assert_eq!(united.header, ["range [m]", "el_deg", "v [m/s]", "name"]);
+        assert_eq!((united.rows.len(), united.number(0, 1)), (1, 2.5));
+        let words = TextTable::parse("a,b\nleft,m\n").unwrap();
+        assert_eq!((words.header[1].as_str(), words.rows.len()), ("b", 1));
         let refused = TextTable::parse("Scan of 2024\na,b\n1,2\n").unwrap_err();
         assert!(
             refused.contains("the header 1 (\"Scan of 2024\")"),

@@ -56,6 +56,12 @@ impl Quantity {
     }
 }
 
+/// Whether a word names a unit of lengths, times, velocities or angles.
+pub(crate) fn is_unit(text: &str) -> bool {
+    let found = product(text);
+    found.is_some_and(|(_, powers)| powers != [0; 3])
+}
+
 /// The unit of times and the text of the date from which they count: `days since 2024-01-31`.
 pub(crate) fn split_date(units: &str) -> (&str, Option<&str>) {
     let lower = units.to_ascii_lowercase();

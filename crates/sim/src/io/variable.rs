@@ -244,7 +244,7 @@ const UNITS_OF_NAMES: [(&str, &str); 19] = [
 ];
 
 /// The name of a column without its unit, and the unit: `range_km`, `range (km)` or `range [km]`.
-fn split_unit(column: &str) -> (&str, Option<&str>) {
+pub(super) fn split_unit(column: &str) -> (&str, Option<&str>) {
     let column = column.trim();
     for (open, close) in [('(', ')'), ('[', ']')] {
         if let Some((name, unit)) = column.strip_suffix(close).and_then(|c| c.rsplit_once(open)) {

@@ -733,6 +733,11 @@ fn what_is_no_map_is_refused_and_nothing_is_written() {
     .unwrap();
     fs::write(folder.join("cut.hpl"), HPL.split_once("  2 ").unwrap().0).unwrap();
     fs::write(
+        folder.join("wide.csv"),
+        "time_s,elevation_deg,50 m,75 m,100 m\n0,1,0.5,0.6,0.7\n",
+    )
+    .unwrap();
+    fs::write(
         folder.join("gates.hpl"),
         HPL.replace("Number of gates:\t4", "Number of gates:\t-4"),
     )
@@ -756,6 +761,7 @@ fn what_is_no_map_is_refused_and_nothing_is_written() {
         ("twice.csv", &["twice.csv", "row 101", "twice", "sweep"]),
         ("line.csv", &["line.csv", "1 different elevations", "RHI"]),
         ("names.csv", &["names.csv", "velocity_m_s"]),
+        ("wide.csv", &["wide.csv", "a column for each range"]),
         ("planes.csv", &["planes.csv", "azimuths"]),
         ("cut.hpl", &["cut.hpl", "cut short", "gates"]),
         ("gates.hpl", &["gates.hpl", "number of gates"]),

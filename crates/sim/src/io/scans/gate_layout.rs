@@ -69,22 +69,31 @@ impl<'f> GateLayout<'f> {
         let stored = [slow_length, fast_length];
         let wanted = [self.rays as u64, self.gates as u64];
         let turned = [wanted[1], wanted[0]];
+        let edges = wanted[1].saturating_sub(1);
         match (stored == wanted, stored == turned) {
             (true, false) => Ok(false),
             (false, true) => Ok(true),
             (true, true) if self.rays == 1 => Ok(false),
             (true, true) => self.is_turned_by_name(name, [slow, fast]),
-            (false, false) => Err(format!(
-                "variable {name} is {}; {} rays x {} ranges are needed",
-                shape
-                    .iter()
-                    .map(u64::to_string)
-                    .collect::<Vec<_>>()
-                    .join(" x "),
-                self.rays,
-                self.gates
-            )),
+            (false, false) => Err(self.other_lengths(name, &shape, stored.contains(&edges))),
         }
+    }
+
+    /// What is said of a variable of other lengths; of one whose ranges may be those of `edges`.
+    fn other_lengths(&self, name: &str, shape: &[u64], has_edges: bool) -> String {
+        let lengths: Vec<String> = shape.iter().map(u64::to_string).collect();
+        let hint = match has_edges {
+            true => {
+                "; ranges of the edges of gates are not read: those of their middles are needed"
+            }
+            false => "",
+        };
+        format!(
+            "variable {name} is {}; {} rays x {} ranges are needed{hint}",
+            lengths.join(" x "),
+            self.rays,
+            self.gates
+        )
     }
 
     /// The same of a variable with as many rays as gates.
@@ -272,5 +281,7 @@ mod tests {
         );
         let other = refused([4, 3], &["time", "range"]);
         assert!(other.contains("v is 3 x 3; 4 rays x 3 ranges"), "{other}");
+        let edges = refused([3, 4], &["time", "range"]);
+        assert!(edges.contains("ranges of the edges of gates"), "{edges}");
     }
 }

@@ -305,6 +305,16 @@ fn needed_column<'t>(
 }
 
 fn missing_column(table: &TextTable, name: &str) -> String {
+    let numbered = table.header.iter().filter(|name| {
+        let first = name.split_whitespace().next().unwrap_or_default();
+        first.parse::<f64>().is_ok()
+    });
+    if numbered.count() > 2 {
+        return format!(
+            "it has a column for each range ({}): a row for each gate is needed, with range_m, elevation_deg and velocity_m_s",
+            column_names(table)
+        );
+    }
     format!(
         "it has no column {name}: range_m, elevation_rad (or elevation_deg), velocity_m_s and, if known, time_s and sigma_m_s are \
          read, or other units in their names; it has {}",
