@@ -94,7 +94,10 @@ pub fn table(profiles: &WindProfiles) -> Table {
         .text("flags", rows.iter().map(|row| flags(&row.flags)))
 }
 
-/// What a command prints of winds: how many heights have one, and why others have none.
+/// Most heights of a window whose winds are printed.
+const MOST_PRINTED: usize = 30;
+
+/// What a command prints of winds: those of a window of few heights, how many heights have one, and why others have none.
 #[must_use]
 pub fn summary(profiles: &WindProfiles) -> String {
     let count = |flag: Flag| {
@@ -108,7 +111,8 @@ pub fn summary(profiles: &WindProfiles) -> String {
     let noise = count(Flag::Noise);
     let undetermined = count(Flag::Undetermined);
     let found = all - noise - undetermined;
-    let mut text = format!(
+    let mut text = profile(&profiles.rows);
+    text += &format!(
         "{found} of {all} heights have a wind; {noise} are noise, the directions do not determine {undetermined}\n"
     );
     if count(Flag::WindAssumed) > 0 {
@@ -118,6 +122,37 @@ pub fn summary(profiles: &WindProfiles) -> String {
         && row.kind == super::Kind::Radial
     {
         text += "all beams have one direction: they show the wind along it alone\n";
+    }
+    text
+}
+
+/// A line for each height with a wind, of one window with few of them.
+fn profile(rows: &[WindRow]) -> String {
+    let mut text = String::new();
+    let is_one = rows.iter().all(|row| row.window == rows[0].window);
+    if !is_one || rows.len() > MOST_PRINTED {
+        return text;
+    }
+    for row in rows.iter().filter(|row| row.has_wind()) {
+        let mut components = Vec::new();
+        for (name, wind_m_s) in row.components() {
+            components.push(format!(
+                "{name} {:.2} +- {:.2}",
+                wind_m_s.value, wind_m_s.std
+            ));
+        }
+        text += &format!(
+            "height {:.1} m: {} m/s",
+            row.height_m,
+            components.join(", ")
+        );
+        if row.edr_m23_s.is_finite() {
+            text += &format!(
+                ", EDR {:.3} ({:.3} to {:.3}) m^(2/3)/s",
+                row.edr_m23_s, row.edr_low_m23_s, row.edr_high_m23_s
+            );
+        }
+        text.push('\n');
     }
     text
 }
