@@ -38,6 +38,8 @@ pub struct FrontEnd {
     pub rounding_noise: f64,
     /// The same of its clipping, [`super::Converter::clipping_noise`].
     pub clipping_noise: f64,
+    /// Factor of clipping on weak signals and on the copy of the noise, [`super::Clipping::gain`].
+    pub clipping_gain: f64,
     /// Lorentzian full width at half maximum of the laser's line \[Hz\]; 0 for none.
     pub linewidth_hz: f64,
     /// Fraction of the pulse's power that the telescope reflects to the receiver,
@@ -59,6 +61,7 @@ impl FrontEnd {
         half_power_hz: f64::INFINITY,
         rounding_noise: 0.0,
         clipping_noise: 0.0,
+        clipping_gain: 1.0,
         linewidth_hz: 0.0,
         reflection: 0.0,
     };
@@ -90,6 +93,7 @@ impl FrontEnd {
             ("saturation_w", self.saturation_w),
             ("half_power_hz", self.half_power_hz),
             ("poles", f64::from(self.poles)),
+            ("clipping_gain", self.clipping_gain),
         ];
         for (field, value) in above {
             if value.is_nan() || value <= 0.0 {

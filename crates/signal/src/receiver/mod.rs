@@ -195,6 +195,12 @@ impl Receiver {
             * (1.0 + self.front_end.rounding_noise + self.front_end.clipping_noise)
     }
 
+    /// Noise of the samples in the detector band \[A^2\]: what the converter leaves of the noise before it, and its own, whose density is that
+    /// of the band.
+    pub fn sampled_noise_a2(&self) -> f64 {
+        self.snr_noise_a2() * self.front_end.clipping_gain.powi(2)
+    }
+
     /// Power of the complex envelope per joule sent and per unit of returned fraction and
     /// `|f|^2`, `2 S^2 P_LO` \[A^2/W\], from (10), (11), (15), corrected by a further `sqrt 2` so
     /// that (14) holds; times `2 pi` with [`PlanckConvention::Hbar`], and what a saturated or

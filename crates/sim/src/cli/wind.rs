@@ -70,6 +70,9 @@ fn outer_scale(word: &str) -> Result<f64, String> {
         .ok_or_else(|| "an outer scale from 1 to 1e5 m, e.g. 100".to_owned())
 }
 
+/// Full width of a Gaussian at half its height over its standard deviation.
+const FWHM: f64 = 2.354_820_045_030_949_3;
+
 /// What is said of raw signals.
 const SIGNALS: &str = "it holds raw signals: `wakescope estimate` makes velocities of them";
 
@@ -159,11 +162,25 @@ fn add_gate(
         observer.warn(&format!("{}: {note}", first.path.display()));
     }
     options.gate_std_m = gate.std_m();
-    options.gate_stride = first.gate_stride.max(1);
+    options.gate_stride = first
+        .gate_stride
+        .max(overlapping(first, options.gate_std_m));
     if let Some(scene) = content {
         options.gate_stride = wind::gate_stride(scene);
     }
     Ok(scene)
+}
+
+/// Gates of a sweep whose weights have widths, at half their heights, from one to the next; at least 1.
+fn overlapping(sweep: &RaySweep, gate_std_m: f64) -> usize {
+    let range_m = sweep.rays.first().map_or(&[][..], |ray| &ray.range_m);
+    match range_m {
+        [first_m, second_m, ..] => {
+            let gates = gate_std_m * FWHM / (second_m - first_m).abs();
+            gates.max(1.0) as usize
+        }
+        _ => 1,
+    }
 }
 
 /// Winds with the options by which they were found.

@@ -53,7 +53,7 @@ impl SceneResponse {
         let response = response(scene, pulse, median_snr(&layer_snr))
             .ok()
             .flatten();
-        let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();
+        let noise_power_a2 = plan.instrument.receiver.sampled_noise_a2();
         Ok(Some(Self {
             scene: scene.clone(),
             response,

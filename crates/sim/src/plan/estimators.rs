@@ -185,7 +185,7 @@ impl NoiseResponse {
             let found = estimator.estimate(&lags, &mut Scratch::new());
             gain.push(of_noise.power / found.power);
         }
-        let unit_a2 = instrument.receiver.noise_variance_a2();
+        let unit_a2 = instrument.receiver.sampled_noise_a2();
         Ok(Self {
             power_a2: of_noise.power * unit_a2,
             density_a2: of_noise.detection * unit_a2,

@@ -223,6 +223,7 @@ fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
         half_power_hz: words.half_power_hz,
         rounding_noise: converter.map_or(0.0, |converter| converter.rounding()),
         clipping_noise: converter.map_or(0.0, |converter| converter.clipping_noise()),
+        clipping_gain: converter.map_or(1.0, |converter| converter.clipping().gain),
         linewidth_hz: scene.laser.linewidth_hz,
         reflection: 10f64.powf(0.1 * scene.telescope.reflection_db),
     }

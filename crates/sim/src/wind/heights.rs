@@ -6,7 +6,8 @@ use super::WindOptions;
 use super::directions::{Components, dot};
 use crate::Error;
 use crate::io::scans::Ray;
-use ndarray::{Array2, s};
+use ndarray::{Array2, ArrayView1, s};
+use std::collections::BTreeMap;
 use wakescope_estimate::wind_profile::{MixtureFit, RadialVelocities, fit_mixture};
 
 /// Bins of fewer velocities are fitted together with their neighbours.
@@ -80,10 +81,44 @@ impl FoundWind {
         vector
     }
 
+    /// What velocities of gates that overlap add to the covariance of the components beyond independent noise of these deviations, m²/s²:
+    /// gates of one ray share fewer samples the farther they are apart, and none from `stride` gates on.
+    pub(super) fn shared_noise_m2_s2(
+        &self,
+        stride: usize,
+        std_m_s: impl Fn(&Cell) -> f64,
+    ) -> Array2<f64> {
+        let mut lines: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (index, cell) in self.used.iter().enumerate() {
+            lines.entry(cell.line).or_default().push(index);
+        }
+        let mut shared = Array2::zeros((self.gain.nrows(), self.gain.nrows()));
+        for own in lines.values() {
+            for (i, j) in own.iter().flat_map(|i| own.iter().map(move |j| (*i, *j))) {
+                let one = &self.used[i];
+                let other = &self.used[j];
+                let apart = one.gate.abs_diff(other.gate);
+                if i == j || apart >= stride {
+                    continue;
+                }
+                let part = 1.0 - apart as f64 / stride as f64;
+                let covariance = part * std_m_s(one) * std_m_s(other);
+                let of_both = outer(self.gain.column(i), self.gain.column(j));
+                shared.scaled_add(covariance, &of_both);
+            }
+        }
+        shared
+    }
+
     /// Probabilities of the velocities of this bin to be good.
     pub(super) fn own_weights(&self, count: usize) -> &[f64] {
         &self.fit.weights[self.first_own..self.first_own + count]
     }
+}
+
+/// The products of the components of two vectors.
+fn outer(one: ArrayView1<'_, f64>, other: ArrayView1<'_, f64>) -> Array2<f64> {
+    Array2::from_shape_fn((one.len(), other.len()), |(i, j)| one[i] * other[j])
 }
 
 /// The velocities of rays.

@@ -141,11 +141,10 @@ pub fn wind_profiles(
     }
     let turbulence = RunTurbulence::new(&all_layers, options)?;
     let mut rows = Vec::new();
-    let is_known = !options.cross_winds.is_empty();
     for (number, components, bins) in &fitted {
         let of = (*number, &windows[*number], components);
         for bin in bins {
-            rows.push(rows::row(of, bin, &turbulence, options.layer_m, is_known)?);
+            rows.push(rows::row(of, bin, &turbulence, options)?);
         }
     }
     Ok(WindProfiles {

@@ -2,6 +2,7 @@
 //!
 //! Check: `wind` in the tests of the program.
 
+use super::WindOptions;
 use super::directions::{Components, Kind};
 use super::heights::{Bin, BinWind, FoundWind};
 use super::turbulence::{LayerTurbulence, RunTurbulence};
@@ -111,8 +112,7 @@ pub(super) fn row(
     (number, window, components): (usize, &Window, &Components),
     bin: &Bin,
     turbulence: &RunTurbulence,
-    layer_m: f64,
-    has_cross_wind: bool,
+    options: &WindOptions,
 ) -> Result<WindRow, Error> {
     let mut row = empty_row((number, window, components), bin);
     let found = match &bin.wind {
@@ -138,17 +138,17 @@ pub(super) fn row(
         row.flags.push(Flag::FewCells);
     }
     let is_stare = matches!(components.kind, Kind::Up | Kind::Radial);
-    if is_stare && !has_cross_wind {
+    if is_stare && options.cross_winds.is_empty() {
         row.flags.push(Flag::WindAssumed);
     }
-    let shared = turbulence.wind_covariance(number, bin, found, &window.rays, layer_m)?;
-    match turbulence.of_height(number, bin.height_m, layer_m) {
+    let in_turbulence = turbulence.wind_covariance(number, bin, found, &window.rays, options)?;
+    match turbulence.of_height(number, bin.height_m, options.layer_m) {
         Some(layer) => add_turbulence(&mut row, layer, &turbulence.outer_scales),
         None => row.flags.push(Flag::ResidualError),
     }
-    let covariance = match shared {
-        Some(shared) => shared,
-        None => of_residuals(found),
+    let covariance = match in_turbulence {
+        Some(covariance) => covariance,
+        None => of_residuals(found, options.gate_stride),
     };
     add_wind(&mut row, found, with_unknown_up(found, covariance));
     Ok(row)
@@ -208,10 +208,11 @@ fn add_turbulence(row: &mut WindRow, layer: &LayerTurbulence, outer_scales: &[(f
     }
 }
 
-/// Covariance of the components if the residuals are independent, m²/s².
-fn of_residuals(found: &FoundWind) -> Array2<f64> {
-    let variance = found.fit.std_m_s * found.fit.std_m_s;
-    found.gain.dot(&found.gain.t()) * variance
+/// Covariance of the components if the residuals are noise, m²/s².
+fn of_residuals(found: &FoundWind, gate_stride: usize) -> Array2<f64> {
+    let std_m_s = found.fit.std_m_s;
+    let independent = found.gain.dot(&found.gain.t()) * (std_m_s * std_m_s);
+    independent + found.shared_noise_m2_s2(gate_stride, |_| std_m_s)
 }
 
 /// The covariance with what an unknown vertical wind adds to the other components, and with the variance of its own.

@@ -41,6 +41,14 @@ pub(super) struct LayerTurbulence {
     has_sigmas: bool,
 }
 
+impl LayerTurbulence {
+    /// Variance of the noise of a velocity, m²/s².
+    fn variance_m2_s2(&self, cell: &Cell) -> f64 {
+        let given = if self.has_sigmas { cell.sigma_m_s } else { 1.0 };
+        self.noise_m2_s2 * given * given
+    }
+}
+
 /// The velocities of a layer of one window.
 pub(super) struct Layer {
     /// Number of the window, and of the layer counted from the height of the lidar.
@@ -284,9 +292,9 @@ impl RunTurbulence {
         bin: &Bin,
         found: &FoundWind,
         rays: &[Ray],
-        layer_m: f64,
+        options: &WindOptions,
     ) -> Result<Option<ndarray::Array2<f64>>, Error> {
-        let key = (window, layer_number(bin.height_m, layer_m));
+        let key = (window, layer_number(bin.height_m, options.layer_m));
         let layer = self.layers.get(&key).zip(self.covariance.as_ref());
         let Some((turbulence, covariance)) = layer else {
             return Ok(None);
@@ -309,9 +317,7 @@ impl RunTurbulence {
                 time_s,
                 carried_m_s,
             ));
-            let square = cell.sigma_m_s * cell.sigma_m_s;
-            let factor = if turbulence.has_sigmas { square } else { 1.0 };
-            noise_m2_s2.push(turbulence.noise_m2_s2 * factor / stride as f64);
+            noise_m2_s2.push(turbulence.variance_m2_s2(cell) / stride as f64);
         }
         let weights = &turbulence.eps23_weights;
         let covariance = wakescope_estimate::wind_profile::wind_covariance(
@@ -321,7 +327,10 @@ impl RunTurbulence {
             covariance,
             weights,
         )?;
-        Ok(Some(covariance))
+        let shared = found.shared_noise_m2_s2(options.gate_stride, |cell| {
+            turbulence.variance_m2_s2(cell).sqrt()
+        });
+        Ok(Some(covariance + shared))
     }
 }
 

@@ -733,6 +733,11 @@ fn what_is_no_map_is_refused_and_nothing_is_written() {
     .unwrap();
     fs::write(folder.join("cut.hpl"), HPL.split_once("  2 ").unwrap().0).unwrap();
     fs::write(
+        folder.join("two.csv"),
+        "range_m,elevation_deg,velocity_m_s,velocity_m_s\n50,1,0.5,0.6\n",
+    )
+    .unwrap();
+    fs::write(
         folder.join("wide.csv"),
         "time_s,elevation_deg,50 m,75 m,100 m\n0,1,0.5,0.6,0.7\n",
     )
@@ -762,6 +767,7 @@ fn what_is_no_map_is_refused_and_nothing_is_written() {
         ("line.csv", &["line.csv", "1 different elevations", "RHI"]),
         ("names.csv", &["names.csv", "velocity_m_s"]),
         ("wide.csv", &["wide.csv", "a column for each range"]),
+        ("two.csv", &["two.csv", "more than one column velocity_m_s"]),
         ("planes.csv", &["planes.csv", "azimuths"]),
         ("cut.hpl", &["cut.hpl", "cut short", "gates"]),
         ("gates.hpl", &["gates.hpl", "number of gates"]),

@@ -4,6 +4,12 @@ use crate::wakescope;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Output;
+use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
+use wakescope_sim::run::run as sim_run;
+use wakescope_sim::scene::SceneFile;
+use wakescope_sim::wind::{WindOptions, winds_of_map};
+use wakescope_sim::write::velocity_map;
 
 const HEADER: &str = "window,start_utc,end_utc,height_m,kind,azimuth_deg,elevation_deg,east_m_s,north_m_s,up_m_s,along_m_s,radial_m_s,\
     east_std_m_s,north_std_m_s,up_std_m_s,along_std_m_s,radial_std_m_s,speed_m_s,speed_std_m_s,from_deg,from_std_deg,\
@@ -482,6 +488,37 @@ fn intervals_of_a_cone_cover_the_wind_in_turbulence_with_and_without_bad_gates()
 const OWN: &str = "[flow]\nkind = \"wind\"\nprofile = \"power\"\nexponent = 0.3\nspeed_m_s = 6.0\ntoward_rad = 1.0\n\
     [detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n[scan]\npattern = { kind = \"vad\", beams = 18 }\nrealisations = 1\n\
     range_min_m = 300.0\nrange_max_m = 400.0\n[estimator]\ngate_step_samples = 20\n[outputs]\npng = false\n";
+
+/// Stares whose gates overlap, as those of a scene do by default.
+const STARES: &str = "seed = SEED\nflow = { kind = \"uniform\", lateral_m_s = 6.0, vertical_m_s = -1.0 }\n\
+    [detector.snr]\nreference = \"fixed\"\nsnr_db = 5.0\n[scan]\npattern = { kind = \"dbs\", elevation_rad = 1.0 }\n\
+    range_min_m = 280.0\nrange_max_m = 420.0\n[estimator]\ngate_step_samples = 8\n";
+
+#[test]
+fn errors_of_winds_of_gates_that_overlap_are_as_large_as_stated() {
+    let seeds = 20;
+    let mut squares = [0.0; 3];
+    for seed in 1..=seeds {
+        let text = STARES.replace("SEED", &seed.to_string());
+        let file = SceneFile::parse(&text, Path::new("s.toml")).unwrap();
+        let plan = Plan::new(file, Target::Map).unwrap();
+        let map = sim_run(&plan, &Silent).unwrap().map.unwrap();
+        let options = WindOptions::of_scene(plan.scene()).unwrap();
+        let found = winds_of_map(&plan, &velocity_map(&plan, &map), &options).unwrap();
+        for (row, true_m_s) in found.rows.iter().zip(&found.true_m_s) {
+            let winds = [row.east_m_s, row.north_m_s, row.up_m_s];
+            for (square, (wind, true_m_s)) in squares.iter_mut().zip(winds.iter().zip(true_m_s)) {
+                let errors = (wind.value - true_m_s) / wind.std;
+                *square += errors * errors / found.rows.len() as f64;
+            }
+        }
+    }
+    // Heights share most of their noise: 20 scans have some 20 independent errors of each component.
+    for square in squares {
+        let rms = (square / f64::from(seeds)).sqrt();
+        assert!((0.65..1.4).contains(&rms), "{rms}");
+    }
+}
 
 #[test]
 fn winds_of_a_run_are_those_of_the_command_and_beside_the_true_ones() {

@@ -498,12 +498,13 @@ pub fn plane_numbers<'s>(scans: impl IntoIterator<Item = &'s ReadScan>) -> Vec<u
     numbers
 }
 
-/// Turns scans over the zenith that look back in the plane of one before, so that all of a plane have one azimuth.
+/// Turns scans over the zenith that look back in the plane of one before, so that all of a plane have one azimuth. Scans of unknown azimuth
+/// all face alike.
 pub fn face_alike(scans: &mut [&mut ReadScan]) {
     for i in 0..scans.len() {
         let (before, rest) = scans.split_at_mut(i);
         let scan = &mut *rest[0];
-        if !is_over_zenith(scan) {
+        if scan.azimuth_rad.is_none() || !is_over_zenith(scan) {
             continue;
         }
         let turned = turned(scan);

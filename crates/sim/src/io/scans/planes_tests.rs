@@ -32,6 +32,35 @@ fn summary(scans: &[PlaneScan]) -> Vec<(i64, i64, i64, usize)> {
 }
 
 #[test]
+fn scans_over_the_zenith_without_an_azimuth_all_face_alike() {
+    let scan = |azimuth_rad: Option<f64>| {
+        let map = ScanMap {
+            elevation_rad: vec![0.7, 1.5, 2.0, 2.4],
+            time_s: vec![0.0; 4],
+            range_m: vec![50.0],
+            velocity_m_s: Array2::from_shape_fn((4, 1), |(line, _)| line as f64),
+            sigma_m_s: None,
+            fold_m_s: None,
+        };
+        ReadScan {
+            azimuth_rad,
+            ..ReadScan::new(std::path::Path::new("a"), 0, map)
+        }
+    };
+    for (azimuths, is_turned) in [
+        ([None, None], false),
+        ([Some(1.0), Some(1.0)], false),
+        ([Some(1.0), Some(1.0 + PI)], true),
+        ([Some(1.0), None], false),
+    ] {
+        let mut scans = azimuths.map(scan);
+        let before = scans[1].clone();
+        face_alike(&mut scans.iter_mut().collect::<Vec<_>>());
+        assert_eq!(scans[1] != before, is_turned, "{azimuths:?}");
+    }
+}
+
+#[test]
 fn scans_end_where_the_elevation_turns() {
     let up = |n: usize| (0..n).map(|i| 0.01 * i as f64);
     let both: Vec<f64> = up(20).chain(up(20).rev().skip(1)).collect();

@@ -10,6 +10,7 @@ use super::{ScanFormat, Text, cfradial, hpl, table};
 use crate::Error;
 use crate::io::netcdf_input::open_groups;
 use crate::io::{UtcTime, text_file};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::path::{Path, PathBuf};
 
 /// Fraction of the rays whose elevations may be impossible; more say that the unit is another one.
@@ -18,7 +19,7 @@ const IMPOSSIBLE: f64 = 0.1;
 /// Cosine of the elevation below which a beam counts as vertical.
 const VERTICAL: f64 = 0.02;
 /// Azimuths that count several turns are at most this in size.
-const MOST_AZIMUTH_RAD: f64 = 2.0 * std::f64::consts::TAU;
+const MOST_AZIMUTH_RAD: f64 = 2.0 * TAU;
 
 /// One line of sight with the velocities of its gates.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -126,8 +127,8 @@ fn of_text(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<FoundRays, 
 
 /// Counts elevations below the horizon from it, and takes azimuths that no beam has for missing ones.
 fn correct_angles(ray: &mut Ray) {
-    if ray.elevation_rad > 1.5 * std::f64::consts::PI {
-        ray.elevation_rad -= std::f64::consts::TAU;
+    if ray.elevation_rad > 1.5 * PI {
+        ray.elevation_rad -= TAU;
     }
     // A fill value that the file does not name.
     if ray.azimuth_rad.abs() > MOST_AZIMUTH_RAD {
@@ -184,7 +185,27 @@ fn check(sweeps: &mut [RaySweep]) -> Result<Vec<String>, String> {
     for text in &mut dropped {
         text.push_str(": skipped");
     }
+    dropped.extend(as_of_radians(sweeps));
     Ok(dropped)
+}
+
+/// That angles in degrees have the values that cones and sectors have in radians, in words.
+fn as_of_radians(sweeps: &[RaySweep]) -> Option<String> {
+    let mut azimuths_deg = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut highest_deg = 0.0_f64;
+    for ray in sweeps.iter().flat_map(|sweep| &sweep.rays) {
+        let azimuth_deg = ray.azimuth_rad.to_degrees();
+        azimuths_deg.0 = azimuths_deg.0.min(azimuth_deg);
+        azimuths_deg.1 = azimuths_deg.1.max(azimuth_deg);
+        highest_deg = highest_deg.max(ray.elevation_rad.to_degrees().abs());
+    }
+    let (low_deg, high_deg) = azimuths_deg;
+    let is_within = high_deg.max(-low_deg) <= TAU && highest_deg <= FRAC_PI_2;
+    (is_within && high_deg - low_deg > PI && highest_deg > 0.0).then(|| {
+        format!(
+            "its azimuths are {low_deg:.2} to {high_deg:.2} degrees, its elevations at most {highest_deg:.2}: angles in radians need that unit"
+        )
+    })
 }
 
 /// Refuses ranges before the lidar or in another unit, and rays without any velocity.
@@ -212,6 +233,27 @@ fn check_gates(sweeps: &[RaySweep]) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn angles_in_radians_that_are_said_to_be_degrees_are_noticed() {
+        let warnings = |scale: f64| {
+            let ray = |step: i32| Ray {
+                azimuth_rad: (scale * f64::from(step)).to_radians(),
+                elevation_rad: (1.2 * scale).to_radians(),
+                range_m: vec![100.0, 200.0],
+                velocity_m_s: vec![1.0, 2.0],
+                ..Ray::default()
+            };
+            let mut sweeps = [RaySweep {
+                rays: (0..7).map(ray).collect(),
+                ..RaySweep::default()
+            }];
+            check(&mut sweeps).unwrap()
+        };
+        assert_eq!(warnings(57.3), Vec::<String>::new());
+        let said = warnings(1.0);
+        assert!(said[0].contains("0.00 to 6.00 degrees"), "{said:?}");
+    }
 
     #[test]
     fn rays_with_an_azimuth_that_no_beam_has_are_skipped() {

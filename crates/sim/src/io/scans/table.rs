@@ -183,6 +183,12 @@ impl<'t> Columns<'t> {
             }
             None => needed_column(table, &VELOCITY, "velocity_m_s")?,
         };
+        let named = table.header.iter().filter(|name| *name == velocity);
+        if named.count() > 1 {
+            return Err(format!(
+                "it has more than one column {velocity}: one is needed"
+            ));
+        }
         let range = needed_column(table, &RANGE, "range_m")?;
         let range_m = variable::values(table, range, Quantity::Length)?;
         let (elevation, elevation_rad) = variable::elevations_rad(table)?

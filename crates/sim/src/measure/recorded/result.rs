@@ -50,7 +50,7 @@ pub(super) fn measured(
     // The noise over that of the scene.
     let factor = match noise {
         NoiseLevel::OfScene => 1.0,
-        NoiseLevel::Given(power) => power / plan.instrument.receiver.noise_variance_a2(),
+        NoiseLevel::Given(power) => power / plan.instrument.receiver.sampled_noise_a2(),
         NoiseLevel::Quietest => quietest(plan, &scan),
     };
     let ScanCells {
