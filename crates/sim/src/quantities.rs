@@ -2,9 +2,19 @@
 //!
 //! Check: each range of the units, and that they join without a gap.
 
+use wakescope_estimate::Measured;
+
 /// A number with so many digits behind the first.
 pub(crate) fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.digits$e}").parse().unwrap_or(value)
+}
+
+/// A value with its standard deviation, if that is known, in so many digits behind the point.
+pub(crate) fn measured(found: Measured, digits: usize) -> String {
+    match found.std.is_finite() {
+        true => format!("{:.digits$} +- {:.digits$}", found.value, found.std),
+        false => format!("{:.digits$}", found.value),
+    }
 }
 
 /// A time, s, in three digits or so.

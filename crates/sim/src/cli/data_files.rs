@@ -5,8 +5,10 @@
 
 use crate::Error;
 use crate::progress::Observer;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind};
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// What `read` makes of each file. Of several, those that cannot be used are skipped, and the observer is warned of each with its reason.
@@ -20,19 +22,21 @@ pub(super) fn each_usable<T>(
 ) -> Result<Vec<T>, Error> {
     let mut usable = Vec::new();
     let mut refused = Vec::new();
-    let mut before: Vec<(u64, &Path)> = Vec::with_capacity(paths.len());
-    for path in paths {
-        if let Ok(about) = std::fs::metadata(path)
-            && about.is_file()
+    let lengths: Vec<Option<u64>> = paths.iter().map(|path| length_of_file(path)).collect();
+    let mut before: BTreeMap<[u8; 32], &Path> = BTreeMap::new();
+    for (path, length) in paths.iter().zip(&lengths) {
+        let alike = lengths.iter().filter(|other| *other == length);
+        if length.is_some()
+            && alike.take(2).count() > 1
+            && let Ok(digest) = digest_of_file(path)
         {
-            let alike = before.iter().filter(|(length, _)| *length == about.len());
-            if let Some((_, same)) = alike.into_iter().find(|(_, other)| are_equal(other, path)) {
+            if let Some(same) = before.get(&digest) {
                 let same = same.display();
                 let path = path.display();
                 observer.warn(&format!("{path}: it is a copy of {same}: file skipped"));
                 continue;
             }
-            before.push((about.len(), path));
+            before.insert(digest, path);
         }
         match read(path) {
             Ok(content) => usable.push(content),
@@ -53,26 +57,22 @@ pub(super) fn each_usable<T>(
     Ok(usable)
 }
 
-/// Whether two files have the same bytes; not of files that cannot be read.
-fn are_equal(path: &Path, other: &Path) -> bool {
-    have_same_bytes(path, other).unwrap_or(false)
+/// The length of a file that can be read twice, bytes.
+fn length_of_file(path: &Path) -> Option<u64> {
+    let about = std::fs::metadata(path).ok()?;
+    about.is_file().then_some(about.len())
 }
 
-fn have_same_bytes(path: &Path, other: &Path) -> std::io::Result<bool> {
-    let mut file = BufReader::new(File::open(path)?);
-    let mut other = BufReader::new(File::open(other)?);
+/// The SHA-256 digest of the bytes of a file.
+fn digest_of_file(path: &Path) -> std::io::Result<[u8; 32]> {
+    let mut file = File::open(path)?;
+    let mut part = vec![0; 1 << 16];
+    let mut digest = Sha256::new();
     loop {
-        let own = file.fill_buf()?;
-        let others = other.fill_buf()?;
-        let count = own.len().min(others.len());
-        if count == 0 {
-            return Ok(own.len() == others.len());
+        match file.read(&mut part)? {
+            0 => return Ok(digest.finalize().into()),
+            count => digest.update(&part[..count]),
         }
-        if own[..count] != others[..count] {
-            return Ok(false);
-        }
-        file.consume(count);
-        other.consume(count);
     }
 }
 

@@ -16,6 +16,7 @@ use crate::io::scans::{ReadScan, are_of_one_plane, face_alike, plane_numbers, sh
 use crate::outputs::Outputs;
 use crate::plan::Stage;
 use crate::progress::{Observer, Silent};
+use crate::quantities::measured;
 use crate::retrieve::{self, Method, PlaneTrack, RetrievedScan, SceneResponse, gate_of};
 use crate::scene::{Estimator, SceneFile};
 use crate::score::PredictedScan;
@@ -651,14 +652,11 @@ fn text(found: &[RetrievedScan]) -> String {
                 (true, false) => format!("{:.1} m^2/s, its error unknown,", mean.value),
                 (true, true) => format!("{:.1} +- {:.1} m^2/s", mean.value, mean.std),
             };
-            let [y, z] =
-                [vortex.lateral_position_m, vortex.height_m].map(|m| match m.std.is_finite() {
-                    true => format!("{:.2} +- {:.2} m", m.value, m.std),
-                    false => format!("{:.2} m", m.value),
-                });
+            let [y, z] = [vortex.lateral_position_m, vortex.height_m].map(|m| measured(m, 2));
             let side = retrieve::name(vortex.side);
-            out +=
-                &format!("{name}: {side:<5} Gamma(5-15 m) {circulation} at y {y}, z {z}{flags}\n");
+            out += &format!(
+                "{name}: {side:<5} Gamma(5-15 m) {circulation} at y {y} m, z {z} m{flags}\n"
+            );
         }
         if let Some(turbulence) = &scan.result.turbulence {
             out += &format!("{name}: {}\n", turbulence_text(turbulence));

@@ -9,7 +9,7 @@ use crate::io::Provenance;
 use crate::io::scans::{RaySweep, ScanFormat, read_rays};
 use crate::outputs::Outputs;
 use crate::progress::Observer;
-use crate::retrieve::{gate_of_instrument, scene_in_file};
+use crate::retrieve::{WIDTH_OVER_STD, gate_of_instrument, scene_in_file};
 use crate::scene::SceneFile;
 use crate::wind::{
     self, CrossWind, Every, Kind, WindOptions, WindProfiles, wind_profiles, windows,
@@ -69,9 +69,6 @@ fn outer_scale(word: &str) -> Result<f64, String> {
         .filter(|outer_scale_m| (1.0..=1e5).contains(outer_scale_m))
         .ok_or_else(|| "an outer scale from 1 to 1e5 m, e.g. 100".to_owned())
 }
-
-/// Full width of a Gaussian at half its height over its standard deviation.
-const FWHM: f64 = 2.354_820_045_030_949_3;
 
 /// What is said of raw signals.
 const SIGNALS: &str = "it holds raw signals: `wakescope estimate` makes velocities of them";
@@ -176,8 +173,9 @@ fn overlapping(sweep: &RaySweep, gate_std_m: f64) -> usize {
     let range_m = sweep.rays.first().map_or(&[][..], |ray| &ray.range_m);
     match range_m {
         [first_m, second_m, ..] => {
-            let gates = gate_std_m * FWHM / (second_m - first_m).abs();
-            gates.max(1.0) as usize
+            let gates = gate_std_m * WIDTH_OVER_STD / (second_m - first_m).abs();
+            // The larger of two of which one is not known is the other one.
+            gates.max(1.0).min(range_m.len() as f64) as usize
         }
         _ => 1,
     }
@@ -210,4 +208,30 @@ fn list(found: Option<Found<'_>>, files: &mut Outputs) -> Result<(), Error> {
         files.figure("wind", figure.as_ref(), |figure| Ok(figure.clone()))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::scans::Ray;
+
+    #[test]
+    fn gates_that_overlap_are_counted_for_any_ranges() {
+        let count = |range_m: &[f64]| {
+            let ray = Ray {
+                range_m: range_m.to_vec(),
+                ..Ray::default()
+            };
+            let sweep = RaySweep {
+                rays: vec![ray],
+                ..RaySweep::default()
+            };
+            overlapping(&sweep, 14.0)
+        };
+        assert_eq!(count(&[100.0, 105.0, 110.0, 115.0, 120.0, 125.0, 130.0]), 6);
+        assert_eq!(count(&[100.0, 125.0, 150.0]), 1);
+        assert_eq!(count(&[0.0, 0.0, 30.0]), 3);
+        assert_eq!(count(&[f64::NAN, 30.0]), 1);
+        assert_eq!(count(&[]), 1);
+    }
 }

@@ -58,12 +58,11 @@ impl TextTable {
         for name in &mut header {
             *name = name.trim().to_owned();
         }
-        if let Some(units) = records.next_if(|row| are_units(row, header.len())) {
-            add_units(&mut header, &units);
-        }
+        let units = records.next_if(|row| are_units(row, header.len()));
+        add_units(&mut header, units.as_deref().unwrap_or_default());
         let mut rows = Vec::new();
         for mut row in records {
-            if row == as_written {
+            if row == as_written || Some(&row) == units.as_ref() {
                 continue;
             }
             while row.len() > header.len() && row.last().is_some_and(|cell| cell.trim().is_empty())
@@ -107,12 +106,12 @@ impl TextTable {
         lines.find_map(|line| line.trim_start().strip_prefix(key))
     }
 
-    /// Index of a column by its name, in capital or small letters.
+    /// Index of a column by its name, in capital or small letters, with or without the unit in brackets behind it.
     pub fn column(&self, name: &str) -> Option<usize> {
-        let mut columns = self.header.iter();
-        let exact = columns.position(|column| column == name);
-        let mut columns = self.header.iter();
-        exact.or_else(|| columns.position(|column| column.eq_ignore_ascii_case(name)))
+        let column = |is_it: &dyn Fn(&str) -> bool| self.header.iter().position(|own| is_it(own));
+        column(&|own| own == name)
+            .or_else(|| column(&|own| own.eq_ignore_ascii_case(name)))
+            .or_else(|| column(&|own| own.ends_with(']') && split_unit(own).0 == name))
     }
 
     /// A cell as a number; NaN where it is empty or none.
@@ -155,17 +154,19 @@ fn are_numbers(cells: &[String]) -> bool {
         .all(|cell| cell.trim().replace(',', ".").parse::<f64>().is_ok())
 }
 
-/// Whether the cells of a row name units of the columns above them: at least two do, and no cell is a number or another word.
+/// Whether the cells of a row name units of so many columns above them: at least two do, and no cell is a number or another word.
 fn are_units(row: &[String], columns: usize) -> bool {
     let mut units = 0;
-    for cell in row {
+    for (column, cell) in row.iter().enumerate() {
         match cell.trim().trim_matches(['[', ']', '(', ')']) {
-            "" | "-" | "dB" | "UTC" => {}
+            "" => {}
+            _ if column >= columns => return false,
+            "-" | "1" | "%" | "dB" | "UTC" => {}
             cell if is_unit(cell) => units += 1,
             _ => return false,
         }
     }
-    units >= 2 && row.len() == columns
+    units >= 2 && row.len() >= columns
 }
 
 /// Puts units behind the names of columns that have none.
@@ -328,6 +329,9 @@ mod tests {
             TextTable::parse("range,el_deg,v,name\n[m],deg,m/s,-\n1.5,2.5,3.5,a\n").unwrap();
         assert_eq!(united.header, ["range [m]", "el_deg", "v [m/s]", "name"]);
         assert_eq!((united.rows.len(), united.number(0, 1)), (1, 2.5));
+        assert_eq!(united.column("v"), Some(2));
+        let joined = TextTable::parse("a,b\nm,s,\n1,2,\na,b\nm,s,\n3,4,\n").unwrap();
+        assert_eq!((joined.rows.len(), joined.number(1, 1)), (2, 4.0));
         let words = TextTable::parse("a,b\nleft,m\n").unwrap();
         assert_eq!((words.header[1].as_str(), words.rows.len()), ("b", 1));
         let refused = TextTable::parse("Scan of 2024\na,b\n1,2\n").unwrap_err();

@@ -28,7 +28,7 @@ pub(crate) trait VariableSource {
     /// # Errors
     /// A variable that cannot be read or is not made of numbers.
     fn numbers(&self, name: &str) -> Result<Vec<f64>, String>;
-    /// Whether the numbers of a variable have 32 bits.
+    /// Whether the numbers of a variable have 32 bits and are not packed.
     fn is_single(&self, name: &str) -> bool;
     /// The texts of a variable.
     ///
@@ -58,7 +58,10 @@ impl VariableSource for NetcdfFile {
     }
 
     fn is_single(&self, name: &str) -> bool {
-        matches!(self.kind(name), Some(NcType::Float))
+        let is_packed = ["scale_factor", "add_offset"]
+            .iter()
+            .any(|attribute| self.number(name, attribute).is_some());
+        matches!(self.kind(name), Some(NcType::Float)) && !is_packed
     }
 
     fn texts(&self, name: &str) -> Result<Vec<String>, String> {
@@ -674,22 +677,28 @@ fn rounding(name: &str, numbers: &[f64], unit_s: f64) -> Option<String> {
     })
 }
 
-/// Adds the days to times of a day that begin anew after midnight. Times that fall by other steps are in no order, and stay.
+/// Adds a day to times of a day after the one place where they begin anew. Times that begin anew several times, as those of a table in
+/// another order, stay.
 fn count_on_after_midnight(time_s: &mut [f64]) {
-    let mut falls = time_s.windows(2).map(|pair| pair[0] - pair[1]);
-    let are_ordered = falls.all(|fall_s| !(PAUSE_S..=DAY_S - PAUSE_S).contains(&fall_s));
-    let are_of_a_day = time_s.iter().all(|time_s| (0.0..=DAY_S).contains(time_s));
-    if !(are_ordered && are_of_a_day) {
-        return;
-    }
-    let mut days_s = 0.0;
-    let mut last_s = 0.0;
-    for time_s in time_s {
-        if last_s - *time_s > DAY_S - PAUSE_S {
-            days_s += DAY_S;
+    let mut last_s = f64::NAN;
+    let mut first_of_next = None;
+    for (at, time_s) in time_s.iter().enumerate() {
+        if time_s.is_nan() {
+            continue;
+        }
+        let is_of_a_day = (0.0..=DAY_S).contains(time_s);
+        let begins_anew = last_s - time_s > DAY_S - PAUSE_S;
+        let is_in_order = last_s.is_nan() || (-0.5 * DAY_S..PAUSE_S).contains(&(last_s - time_s));
+        if !is_of_a_day || !(is_in_order || begins_anew && first_of_next.is_none()) {
+            return;
+        }
+        if begins_anew {
+            first_of_next = Some(at);
         }
         last_s = *time_s;
-        *time_s += days_s;
+    }
+    if let Some(at) = first_of_next {
+        time_s[at..].iter_mut().for_each(|time_s| *time_s += DAY_S);
     }
 }
 

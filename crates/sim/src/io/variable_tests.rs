@@ -241,7 +241,11 @@ fn times_of_a_day_go_on_after_midnight() {
     );
     let hours = found("hours since 2024-01-31", &day_s.map(|s| s / 3600.0));
     assert!((hours[3] - 86_400.5).abs() < 1e-6);
-    // In another order, and of more than a day.
+    let gap = found(seconds, &[86_399.0, f64::NAN, 0.5]);
+    assert_eq!((gap[0], gap[2]), (86_399.0, 86_400.5));
+    // By range and then time, in another order, and of more than a day.
+    let of_gates = [10.0, 86_390.0, 10.0, 86_390.0];
+    assert_eq!(found(seconds, &of_gates), of_gates);
     let shuffled = [86_399.0, 0.0, 40_000.0, 20_000.0];
     assert_eq!(found(seconds, &shuffled), shuffled);
     let long = [86_399.0, 86_401.0, 0.0];

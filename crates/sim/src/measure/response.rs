@@ -21,7 +21,7 @@ pub struct SceneResponse {
     response: Option<Response>,
     pulse_sigma_s: f64,
     noise: Noise,
-    /// Mean square of a sample of noise, A^2.
+    /// Mean square of the noise of the samples in the detector band, A^2.
     pub(crate) noise_power_a2: f64,
     layer_snr: Vec<(f64, f64)>,
     radius: Radius,

@@ -23,6 +23,8 @@ mod table;
 pub(crate) mod truth;
 
 pub use envelope::{envelope_table, envelopes};
+#[cfg(feature = "cli")]
+pub(crate) use one_scan::WIDTH_OVER_STD;
 pub use one_scan::{gate_of, gate_of_instrument, options, retrieve_map, scene_in_file, scene_of};
 
 pub use own::{retrieve_signals, scan_of_signals};

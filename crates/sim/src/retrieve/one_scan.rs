@@ -23,7 +23,7 @@ const LONG_GATE_M: f64 = 3.0;
 /// Points of the weight along the line, m.
 const SPACING_M: f64 = 1.25;
 /// Root of 8 ln 2: width at half height of a Gaussian over its standard deviation.
-const WIDTH_OVER_STD: f64 = 2.354_820_045_030_949_4;
+pub(crate) const WIDTH_OVER_STD: f64 = 2.354_820_045_030_949_4;
 
 /// What is told of gates whose weight is not wholly known.
 const WITHOUT_PULSE: &str =

@@ -6,8 +6,7 @@ use super::WindOptions;
 use super::directions::{Components, dot};
 use crate::Error;
 use crate::io::scans::Ray;
-use ndarray::{Array2, ArrayView1, s};
-use std::collections::BTreeMap;
+use ndarray::{Array2, s};
 use wakescope_estimate::wind_profile::{MixtureFit, RadialVelocities, fit_mixture};
 
 /// Bins of fewer velocities are fitted together with their neighbours.
@@ -88,23 +87,25 @@ impl FoundWind {
         stride: usize,
         std_m_s: impl Fn(&Cell) -> f64,
     ) -> Array2<f64> {
-        let mut lines: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for (index, cell) in self.used.iter().enumerate() {
-            lines.entry(cell.line).or_default().push(index);
-        }
-        let mut shared = Array2::zeros((self.gain.nrows(), self.gain.nrows()));
-        for own in lines.values() {
-            for (i, j) in own.iter().flat_map(|i| own.iter().map(move |j| (*i, *j))) {
-                let one = &self.used[i];
-                let other = &self.used[j];
-                let apart = one.gate.abs_diff(other.gate);
-                if i == j || apart >= stride {
-                    continue;
+        let mut order: Vec<usize> = (0..self.used.len()).collect();
+        order.sort_by_key(|index| (self.used[*index].line, self.used[*index].gate));
+        let count = self.gain.nrows();
+        let mut shared = Array2::zeros((count, count));
+        for (at, i) in order.iter().enumerate() {
+            let one = &self.used[*i];
+            for j in &order[at + 1..] {
+                let other = &self.used[*j];
+                let apart = other.gate.abs_diff(one.gate);
+                if other.line != one.line || apart >= stride {
+                    break;
                 }
                 let part = 1.0 - apart as f64 / stride as f64;
                 let covariance = part * std_m_s(one) * std_m_s(other);
-                let of_both = outer(self.gain.column(i), self.gain.column(j));
-                shared.scaled_add(covariance, &of_both);
+                for ((a, b), sum) in shared.indexed_iter_mut() {
+                    let both = self.gain[[a, *i]] * self.gain[[b, *j]]
+                        + self.gain[[a, *j]] * self.gain[[b, *i]];
+                    *sum += covariance * both;
+                }
             }
         }
         shared
@@ -114,11 +115,6 @@ impl FoundWind {
     pub(super) fn own_weights(&self, count: usize) -> &[f64] {
         &self.fit.weights[self.first_own..self.first_own + count]
     }
-}
-
-/// The products of the components of two vectors.
-fn outer(one: ArrayView1<'_, f64>, other: ArrayView1<'_, f64>) -> Array2<f64> {
-    Array2::from_shape_fn((one.len(), other.len()), |(i, j)| one[i] * other[j])
 }
 
 /// The velocities of rays.

@@ -5,6 +5,7 @@
 use super::rows::{Flag, WindRow};
 use super::{WindOptions, WindProfiles};
 use crate::io::{Table, UtcTime};
+use crate::quantities::measured;
 #[cfg(feature = "cli")]
 use serde_json::{Value, json};
 use wakescope_estimate::Measured;
@@ -136,10 +137,7 @@ fn profile(rows: &[WindRow]) -> String {
     for row in rows.iter().filter(|row| row.has_wind()) {
         let mut components = Vec::new();
         for (name, wind_m_s) in row.components() {
-            components.push(format!(
-                "{name} {:.2} +- {:.2}",
-                wind_m_s.value, wind_m_s.std
-            ));
+            components.push(format!("{name} {}", measured(wind_m_s, 2)));
         }
         text += &format!(
             "height {:.1} m: {} m/s",

@@ -62,11 +62,11 @@ fn the_noise_of_the_signals_is_that_which_the_ratio_counts() {
 
 #[test]
 fn a_map_has_the_ratio_of_the_scene_with_a_converter_of_few_bits() {
-    let of_map = |snr_db: f64, bits: u32, full_scale: f64| {
+    let of_map = |snr_db: f64, bits: u32, full_scale: f64, words: &str| {
         let plan = plan(
             &format!(
                 "[detector]\nsnr = {{ reference = \"fixed\", snr_db = {snr_db:?} }}\n\
-                 digitiser = {{ kind = \"quantised\", bits = {bits}, full_scale_over_noise = {full_scale:?} }}\n"
+                 digitiser = {{ kind = \"quantised\", bits = {bits}, full_scale_over_noise = {full_scale:?} }}\n{words}\n"
             ),
             Target::Map,
         );
@@ -75,11 +75,17 @@ fn a_map_has_the_ratio_of_the_scene_with_a_converter_of_few_bits() {
         10.0 * (ratios.iter().sum::<f64>() / ratios.len() as f64).log10()
     };
     // 3 gates of 5 lines and 120 pulses; the speckle of a gate and pulse has a relative deviation of 1.
-    for (snr_db, bits, full_scale) in [(-3.0, 3, 8.0), (5.0, 3, 8.0), (-3.0, 8, 2.0)] {
-        let found_db = of_map(snr_db, bits, full_scale);
+    for (snr_db, bits, full_scale, words) in [
+        (-3.0, 3, 8.0, ""),
+        (5.0, 3, 8.0, ""),
+        (-3.0, 8, 2.0, ""),
+        (-3.0, 3, 8.0, "noise = \"white\""),
+        (-3.0, 3, 8.0, "signal = \"baseband\""),
+    ] {
+        let found_db = of_map(snr_db, bits, full_scale, words);
         assert!(
             (found_db - snr_db).abs() < 0.35,
-            "{bits} bits: {found_db} {snr_db}"
+            "{bits} bits, {words}: {found_db} {snr_db}"
         );
     }
 }

@@ -766,7 +766,7 @@ fn what_is_no_map_is_refused_and_nothing_is_written() {
         ("twice.csv", &["twice.csv", "row 101", "twice", "sweep"]),
         ("line.csv", &["line.csv", "1 different elevations", "RHI"]),
         ("names.csv", &["names.csv", "velocity_m_s"]),
-        ("wide.csv", &["wide.csv", "a column for each range"]),
+        ("wide.csv", &["wide.csv", "columns are named by numbers"]),
         ("two.csv", &["two.csv", "more than one column velocity_m_s"]),
         ("planes.csv", &["planes.csv", "azimuths"]),
         ("cut.hpl", &["cut.hpl", "cut short", "gates"]),

@@ -149,9 +149,10 @@ fn scene_of<'f>(file: &'f NetcdfFile, velocity: &VelocityVariable) -> Option<&'f
         .filter(|text| !text.is_empty())
 }
 
-/// Distance of the first two gates, m.
+/// Distance of the first two gates of known ranges, m.
 fn gate_length_m(range_m: &[f64]) -> Option<f64> {
-    range_m.get(1).map(|second_m| second_m - range_m[0])
+    let mut steps_m = range_m.windows(2).map(|pair| pair[1] - pair[0]);
+    steps_m.find(|step_m| step_m.is_finite())
 }
 
 /// Ranges of the gates, m: those of all rays, or of each ray.
@@ -494,38 +495,35 @@ fn ranges(file: &NetcdfFile) -> Result<Vec<f64>, String> {
 }
 
 /// The middles of gates whose edges the file has (the attribute `bounds` of CF), where its ranges are others, such as those of their
-/// starts.
+/// starts. Edges between which their ranges do not lie are not used.
 ///
 /// # Errors
-/// Bounds of another number of gates.
+/// Edges that cannot be read.
 fn within_bounds(file: &NetcdfFile, name: &str, range_m: Vec<f64>) -> Result<Vec<f64>, String> {
-    let Some(bounds) = file.text(name, "bounds").filter(|name| file.has(name)) else {
+    let shape = [range_m.len() as u64, 2];
+    let bounds = file.text(name, "bounds");
+    let Some(bounds) = bounds.filter(|name| file.shape(name).is_some_and(|own| own == shape))
+    else {
         return Ok(range_m);
     };
-    // Edges have the unit of their ranges.
-    let unit_m = file.unit(name, Quantity::Length)?;
+    // Edges have the unit of their ranges unless they state one.
+    let of_unit = file.text(bounds, "units").map_or(name, |_| bounds);
+    let unit_m = file.unit(of_unit, Quantity::Length)?;
     let edges = file.floats(bounds)?;
-    if edges.len() != 2 * range_m.len() {
-        return Err(format!(
-            "{bounds}, the bounds of {name}, has {} values; two for each of {} gates are needed",
-            edges.len(),
-            range_m.len()
-        ));
-    }
     let mut middles_m = Vec::with_capacity(range_m.len());
     let mut is_off = false;
-    for (range_m, edges) in range_m.iter().zip(edges.chunks_exact(2)) {
-        let middle_m = 0.5 * unit_m * (edges[0] + edges[1]);
-        let length_m = unit_m * (edges[1] - edges[0]).abs();
-        is_off |= (middle_m - range_m).abs() > SAME_MIDDLE * length_m;
+    for (own_m, edges) in range_m.iter().zip(edges.chunks_exact(2)) {
+        let low_m = unit_m * edges[0].min(edges[1]);
+        let high_m = unit_m * edges[0].max(edges[1]);
+        let middle_m = 0.5 * (low_m + high_m);
+        let error_m = SAME_MIDDLE * (high_m - low_m);
+        if !(low_m - error_m..=high_m + error_m).contains(own_m) {
+            return Ok(range_m);
+        }
+        is_off |= (middle_m - own_m).abs() > error_m;
         middles_m.push(middle_m);
     }
-    let are_known = middles_m.iter().all(|middle_m| middle_m.is_finite());
-    Ok(if is_off && are_known {
-        middles_m
-    } else {
-        range_m
-    })
+    Ok(if is_off { middles_m } else { range_m })
 }
 
 /// The one row that a variable repeats for each ray; rows without a value are passed over.

@@ -171,6 +171,12 @@ fn ranges_of_the_starts_of_gates_follow_their_bounds() {
         let map = read(&starts).unwrap().0.remove(0).map;
         assert!((map.range_m[0] - first_m).abs() < 1e-9, "{start_km}");
         assert!((map.range_m[5] - first_m - 50.0).abs() < 1e-9);
+        // Edges of other gates are none of these.
+        let (shape, attributes, edges) = starts.0.remove("edges").unwrap();
+        let far = edges.iter().map(|edge| 10.0 * edge).collect();
+        starts.0.insert("edges", (shape, attributes, far));
+        let map = read(&starts).unwrap().0.remove(0).map;
+        assert!((map.range_m[0] - 1e3 * start_km).abs() < 1e-9);
     }
 }
 

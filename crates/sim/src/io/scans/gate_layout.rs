@@ -69,13 +69,16 @@ impl<'f> GateLayout<'f> {
         let stored = [slow_length, fast_length];
         let wanted = [self.rays as u64, self.gates as u64];
         let turned = [wanted[1], wanted[0]];
-        let edges = wanted[1].saturating_sub(1);
+        let edges = [wanted[0], wanted[1].saturating_sub(1)];
+        let turned_edges = [edges[1], edges[0]];
         match (stored == wanted, stored == turned) {
             (true, false) => Ok(false),
             (false, true) => Ok(true),
             (true, true) if self.rays == 1 => Ok(false),
             (true, true) => self.is_turned_by_name(name, [slow, fast]),
-            (false, false) => Err(self.other_lengths(name, &shape, stored.contains(&edges))),
+            (false, false) => {
+                Err(self.other_lengths(name, &shape, stored == edges || turned_edges == stored))
+            }
         }
     }
 

@@ -203,7 +203,7 @@ fn as_of_radians(sweeps: &[RaySweep]) -> Option<String> {
     let is_within = high_deg.max(-low_deg) <= TAU && highest_deg <= FRAC_PI_2;
     (is_within && high_deg - low_deg > PI && highest_deg > 0.0).then(|| {
         format!(
-            "its azimuths are {low_deg:.2} to {high_deg:.2} degrees, its elevations at most {highest_deg:.2}: angles in radians need that unit"
+            "its azimuths are {low_deg:.2} to {high_deg:.2} degrees, its elevations at most {highest_deg:.2}: if they are radians, they need that unit"
         )
     })
 }

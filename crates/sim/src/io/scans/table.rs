@@ -317,7 +317,7 @@ fn missing_column(table: &TextTable, name: &str) -> String {
     });
     if numbered.count() > 2 {
         return format!(
-            "it has a column for each range ({}): a row for each gate is needed, with range_m, elevation_deg and velocity_m_s",
+            "its columns are named by numbers ({}): a row for each gate is needed, with range_m, elevation_deg and velocity_m_s",
             column_names(table)
         );
     }

@@ -1,9 +1,9 @@
 //! Velocities that no air has, and values that stand for missing ones without being declared so.
 //!
 //! Writers mark gates without a signal by 0, by a large number or by the end of the band, and not all files name that value. It is
-//! known by how often it comes: velocities of air scatter, also in files of few digits. Lines of sight of one value are left alone, as
-//! a beam across an exact wind has 0 m/s in all gates.
-//! Check: zeros among velocities of few and of many digits; exact winds; fill values that no air has.
+//! known by how often it comes, unless the digits are so few that the air itself has one velocity. Lines of sight of one value do not
+//! count, as a beam across an exact wind has 0 m/s in all gates.
+//! Check: zeros among velocities of few and of many digits; calm air in few digits; exact winds; fill values that no air has.
 
 use crate::io::units::FASTEST_M_S;
 
@@ -17,6 +17,10 @@ const TIMES_AS_OFTEN: usize = 10;
 const LEAST_FRACTION: f64 = 0.01;
 const FEWEST_GATES: usize = 10;
 const FEWEST_OTHERS: usize = 20;
+/// Velocities in steps of at least this may be the same in calm air, m/s.
+const COARSE_STEP_M_S: f64 = 0.2;
+/// In steps of less, air of one velocity also has those beside it, this many times as often as the next ones.
+const STEEPNESS: usize = 3;
 /// How to mend a file whose velocities are refused.
 const CURE: &str =
     "its unit must be m/s, and a missing one its fill value, in a table an empty cell";
@@ -106,23 +110,30 @@ fn stand_in_m_s(lines_m_s: &[&mut [f64]]) -> Option<f64> {
         }
     }
     all.sort_unstable_by(f64::total_cmp);
-    let mut most = 0;
-    let mut second = 0;
-    let mut value_m_s = 0.0;
-    let mut different: usize = 0;
-    for same in all.chunk_by(|a, b| a == b) {
-        different += 1;
-        if same.len() > most {
-            second = most;
-            most = same.len();
-            value_m_s = same[0];
-        } else {
-            second = second.max(same.len());
-        }
-    }
-    let is_often = most >= FEWEST_GATES.max(TIMES_AS_OFTEN * second)
+    let values: Vec<&[f64]> = all.chunk_by(|a, b| a == b).collect();
+    let at = (0..values.len()).max_by_key(|at| values[*at].len())?;
+    let most = values[at].len();
+    let mut others = values.iter().enumerate().filter(|(other, _)| *other != at);
+    let is_often = others.all(|(_, other)| most >= TIMES_AS_OFTEN * other.len())
+        && most >= FEWEST_GATES
         && most as f64 >= LEAST_FRACTION * all.len() as f64;
-    (is_often && different > FEWEST_OTHERS).then_some(value_m_s + 0.0)
+    let is_alone = values.len() > FEWEST_OTHERS && !is_coarse(&values) && !is_peak(&values, at);
+    (is_often && is_alone).then_some(values[at][0] + 0.0)
+}
+
+/// Whether all different values are far apart.
+fn is_coarse(values: &[&[f64]]) -> bool {
+    let mut steps = values.windows(2).map(|pair| pair[1][0] - pair[0][0]);
+    steps.all(|step_m_s| step_m_s > COARSE_STEP_M_S)
+}
+
+/// Whether the values beside one come far more often than those beside them, as about the velocity of calm air.
+fn is_peak(values: &[&[f64]], at: usize) -> bool {
+    let count = |from: usize| {
+        let below = at.checked_sub(from).map_or(0, |below| values[below].len());
+        below.max(values.get(at + from).map_or(0, |above| above.len()))
+    };
+    count(1) > STEEPNESS * count(2)
 }
 
 #[cfg(test)]
@@ -172,12 +183,33 @@ mod tests {
     fn velocities_of_few_digits_and_exact_winds_stay() {
         // Packed in steps of 0.5 m/s, where 0 comes as often as its neighbours.
         let mut packed = lines_m_s(2.0);
+        // Calm air in steps, with noise beside it.
+        let calm = |step_m_s: f64, part: f64| {
+            let mut lines = lines_m_s(1e6);
+            for (at, velocity) in lines.iter_mut().flatten().enumerate() {
+                let noise = ((17 * at) % 201) as f64 - 100.0;
+                let steps = match at % 5 {
+                    0 => noise,
+                    _ => (part * (1.9 * at as f64).sin()).round(),
+                };
+                *velocity = step_m_s * steps;
+            }
+            lines
+        };
+        let mut calm_in_coarse_steps = calm(0.5, 0.2);
+        let mut calm_in_fine_steps = calm(0.1, 0.501);
         // A vertical beam in each fifth line, in a wind that differs from gate to gate.
         let mut exact = lines_m_s(1e6);
         exact.iter_mut().step_by(5).for_each(|line| line.fill(0.0));
         // One wind in all gates.
         let mut uniform: Vec<Vec<f64>> = (0..40).map(|i| vec![f64::from(i % 8); 12]).collect();
-        for lines in [&mut packed, &mut exact, &mut uniform] {
+        for lines in [
+            &mut packed,
+            &mut calm_in_coarse_steps,
+            &mut calm_in_fine_steps,
+            &mut exact,
+            &mut uniform,
+        ] {
             let before = lines.clone();
             assert_eq!(dropped(lines).unwrap(), Vec::<String>::new());
             assert_eq!(*lines, before);
