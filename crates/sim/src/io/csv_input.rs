@@ -6,8 +6,7 @@
 //! Check: what the writer of tables makes of any text comes back; one table in each of these forms.
 
 use super::netcdf_input::quoted;
-use super::units::is_unit;
-use super::variable::split_unit;
+use super::units::{is_unit, split_unit};
 use super::{Provenance, text_file};
 use crate::Error;
 use std::path::Path;

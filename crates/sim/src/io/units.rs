@@ -62,6 +62,51 @@ pub(crate) fn is_unit(text: &str) -> bool {
     found.is_some_and(|(_, powers)| powers != [0; 3])
 }
 
+/// Units behind the names of columns, the longer ones first.
+const UNITS_OF_NAMES: [(&str, &str); 19] = [
+    ("_cm_s", "cm s-1"),
+    ("_km_h", "km h-1"),
+    ("_m_s", "m s-1"),
+    ("_degrees", "degrees"),
+    ("_deg", "degrees"),
+    ("_rad", "rad"),
+    ("_seconds", "s"),
+    ("_hours", "hours"),
+    ("_days", "days"),
+    ("_ms", "ms"),
+    ("_us", "us"),
+    ("_ns", "ns"),
+    ("_db", "dB"),
+    ("_km", "km"),
+    ("_cm", "cm"),
+    ("_kt", "kt"),
+    ("_m", "m"),
+    ("_s", "s"),
+    ("_h", "hours"),
+];
+
+/// The name of a column without its unit, and the unit: `range_km`, `range (km)` or `range [km]`.
+pub(super) fn split_unit(column: &str) -> (&str, Option<&str>) {
+    let column = column.trim();
+    for (open, close) in [('(', ')'), ('[', ']')] {
+        if let Some((name, unit)) = column.strip_suffix(close).and_then(|c| c.rsplit_once(open)) {
+            return (name.trim_end(), Some(unit.trim()));
+        }
+    }
+    for (suffix, unit) in UNITS_OF_NAMES {
+        let Some(at) = column.len().checked_sub(suffix.len()) else {
+            continue;
+        };
+        let is_there = column
+            .get(at..)
+            .is_some_and(|end| end.eq_ignore_ascii_case(suffix));
+        if is_there && at > 0 {
+            return (&column[..at], Some(unit));
+        }
+    }
+    (column, None)
+}
+
 /// The unit of times and the text of the date from which they count: `days since 2024-01-31`.
 pub(crate) fn split_date(units: &str) -> (&str, Option<&str>) {
     let lower = units.to_ascii_lowercase();
