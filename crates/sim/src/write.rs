@@ -320,7 +320,7 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
     })
 }
 
-/// Mean square of the noise of a sample in the band of the noise, with that of the converter, of both quadratures together, A^2.
+/// Mean square of the noise of a sample before the converter, of both quadratures together, A^2.
 fn noise_power_a2(plan: &Plan) -> f64 {
     let detector = &plan.scene().detector;
     let is_baseband = detector.signal == DetectorSignal::Baseband;
@@ -331,6 +331,5 @@ fn noise_power_a2(plan: &Plan) -> f64 {
         NoiseModel::White if is_baseband => detector.sampling_hz,
         NoiseModel::White => 0.5 * detector.sampling_hz,
     };
-    let receiver = &plan.instrument.receiver;
-    receiver.sampled_noise_a2() / detector.bandwidth_hz * noise_band_hz
+    plan.instrument.receiver.noise_density_a2_hz() * noise_band_hz
 }
