@@ -9,7 +9,7 @@ pub(crate) fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.digits$e}").parse().unwrap_or(value)
 }
 
-/// A value with its standard deviation, if that is known, in so many digits behind the point.
+/// A value with its standard deviation, if that is known, both with `digits` decimals.
 pub(crate) fn measured(found: Measured, digits: usize) -> String {
     match found.std.is_finite() {
         true => format!("{:.digits$} +- {:.digits$}", found.value, found.std),

@@ -153,7 +153,7 @@ fn are_numbers(cells: &[String]) -> bool {
         .all(|cell| cell.trim().replace(',', ".").parse::<f64>().is_ok())
 }
 
-/// Whether the cells of a row name units of so many columns above them: at least two do, and no cell is a number or another word.
+/// Whether the cells of a row below a header of `columns` names are units: at least two are, and no cell is a number or another word.
 fn are_units(row: &[String], columns: usize) -> bool {
     let mut units = 0;
     for (column, cell) in row.iter().enumerate() {

@@ -11,13 +11,14 @@ use crate::io::units::FASTEST_M_S;
 const FAST_M_S: f64 = 90.0;
 /// Fraction of the velocities that may be beyond what air has; more say that the unit is another one.
 const IMPOSSIBLE: f64 = 0.01;
-/// A value stands for missing velocities if it comes this many times as often as any other one, in this fraction of the gates, and
-/// in so many, and if there are so many others.
+/// A value stands for missing velocities if it comes this many times as often as any other one.
 const TIMES_AS_OFTEN: usize = 10;
+/// Least fraction of the velocities, and fewest gates, that such a value has.
 const LEAST_FRACTION: f64 = 0.01;
 const FEWEST_GATES: usize = 10;
+/// Fewest other values beside it.
 const FEWEST_OTHERS: usize = 20;
-/// Velocities in steps of at least this may be the same in calm air, m/s.
+/// Velocities in steps of more than this may all be the same in calm air, m/s: none of them stands for missing ones.
 const COARSE_STEP_M_S: f64 = 0.2;
 /// In steps of less, air of one velocity also has those beside it, this many times as often as the next ones.
 const STEEPNESS: usize = 3;
