@@ -6,7 +6,7 @@
 //!
 //! Beams less than 0.1 rad apart count as parallel: the weights of both gates are one Gaussian of sqrt(2) times the standard deviation, and the
 //! covariance depends on the distances s along and y across the mean direction alone. It is tabulated over (sqrt s, sqrt y).
-//! Other beams take seven Gauss-Hermite nodes along each gate.
+//! Other beams take seven Gauss-Hermite nodes along each gate, or three where the gates are far apart.
 //! Check: tables by an independent quadrature in `tests/reference/wind`.
 
 use ndarray::Array2;
@@ -26,6 +26,13 @@ const NODES: [(f64, f64); 7] = [
     (2.366_759_410_734_541, 3.075_712_396_758_65e-2),
     (3.750_439_717_725_742, 5.482_688_559_722_18e-4),
 ];
+/// Those of three nodes, exact for gates that are so many standard deviations apart to 1e-6 of the correlation.
+const FAR_NODES: [(f64, f64); 3] = [
+    (-1.732_050_807_568_877_2, 1.0 / 6.0),
+    (0.0, 2.0 / 3.0),
+    (1.732_050_807_568_877_2, 1.0 / 6.0),
+];
+const FAR_APART: f64 = 10.0;
 /// Gates that are shorter than this fraction of an outer scale have no table.
 const SHORTEST: f64 = 1e-3;
 /// Knots of a table along each axis in square roots of the standard deviation, and their limits.
@@ -163,8 +170,11 @@ impl GateCovariance {
     fn wide_into(&self, apart_m: [f64; 3], a: [f64; 3], b: [f64; 3], out_m2_s2: &mut [f64]) {
         out_m2_s2.fill(0.0);
         let cosine = dot(a, b);
+        let far_m = FAR_APART * self.gate_std_m;
         let nodes = if self.gate_std_m == 0.0 {
             &NODES[3..4]
+        } else if dot(apart_m, apart_m) > far_m * far_m {
+            &FAR_NODES[..]
         } else {
             &NODES[..]
         };
@@ -175,7 +185,7 @@ impl GateCovariance {
                     r_m[d] += self.gate_std_m * (node_a * a[d] - node_b * b[d]);
                 }
                 let r2 = dot(r_m, r_m);
-                let w = r2.cbrt();
+                let w = r2.powf(1.0 / 3.0);
                 // Of two equal points the separation has no direction, and B_LL is B_NN.
                 let product = dot(a, r_m) * dot(b, r_m) / r2.max(f64::MIN_POSITIVE);
                 for (scale, out) in self.scales.iter().zip(out_m2_s2.iter_mut()) {

@@ -1,7 +1,7 @@
 //! Standard deviations of winds and dissipations in turbulence that neighbouring velocities share.
 //!
 //! ```text
-//! cov(u) = G [sum_L p(L) (t1 B(L) + t2 I)] G^T
+//! cov(u) = G [sum_L p(L) t1 B(L)] G^T
 //! cov(t) = H^-1 J H^-1,  H_ij = 1/2 sum_b tr(M_i^b K_b M_j^b K_b),  J_ij = 1/2 sum_ab tr(M_i^a K_ab M_j^b K_ab^T)
 //! M_1 = P B P,  M_2 = P P,  P = K^-1 - K^-1 X (X^T K^-1 X)^-1 X^T K^-1
 //! ```
@@ -26,20 +26,18 @@ const LEAST_NOISE: f64 = 1e-4;
 /// Steps in which displacements of blocks are compared \[m\].
 const SAME_DISPLACEMENT_M: f64 = 1e-3;
 
-/// Covariance of a wind u = G v \[m²/s²\], from its gain G \[component, velocity\], the gates, the variance of the noise of each velocity and,
-/// for each outer scale of the covariance, its probability times eps^(2/3).
+/// Covariance of a wind u = G v by turbulence alone \[m²/s²\], from its gain G \[component, velocity\], the gates and, for each outer scale of
+/// the covariance, its probability times eps^(2/3).
 ///
 /// # Errors
 /// [`Error::Length`] for shapes that do not fit.
 pub fn wind_covariance(
     gain: ArrayView2<'_, f64>,
     gates: &[GatePosition],
-    noise_m2_s2: &[f64],
     covariance: &GateCovariance,
     eps23_weights: &[f64],
 ) -> Result<Array2<f64>, Error> {
     length("gates", gain.ncols(), gates.len())?;
-    length("noise_m2_s2", gain.ncols(), noise_m2_s2.len())?;
     length("eps23_weights", covariance.len(), eps23_weights.len())?;
     let mut total = Array2::zeros((gates.len(), gates.len()));
     for (matrix, weight) in covariance.matrices(gates).iter().zip(eps23_weights) {
@@ -49,7 +47,6 @@ pub fn wind_covariance(
         for j in 0..i {
             total[[j, i]] = total[[i, j]];
         }
-        total[[i, i]] += noise_m2_s2[i];
     }
     Ok(gain.dot(&total).dot(&gain.t()))
 }

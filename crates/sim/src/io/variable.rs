@@ -146,6 +146,11 @@ pub(crate) const SIGMA: VariableNames = VariableNames {
         "radial_velocity_of_scatterers_toward_instrument standard_error",
     ],
 };
+/// Widths of Doppler spectra, which have the unit of velocities.
+const WIDTH: VariableNames = VariableNames {
+    names: "spectrum_width spectral_width doppler_spectrum_width velocity_width width sw wradh",
+    standard_names: &["doppler_spectrum_width"],
+};
 /// Ratios of signal and noise.
 pub(crate) const RATIO: VariableNames = VariableNames {
     names: "signal_to_noise_ratio snr cnr carrier_to_noise_ratio intensity signal_to_noise_ratio_plus_one snr_plus_one",
@@ -212,6 +217,30 @@ pub(crate) fn find<'s>(source: &'s dyn VariableSource, known: &VariableNames) ->
         let own = source.attribute(name, "standard_name").unwrap_or_default();
         known.standard_names.contains(&own)
     })
+}
+
+/// Refuses a variable that is named for velocities though its name or standard name is that of another quantity with their unit.
+///
+/// # Errors
+/// The variable and what it holds.
+pub(crate) fn refuse_other_than_velocity(
+    source: &dyn VariableSource,
+    name: &str,
+) -> Result<(), String> {
+    let standard_name = source.attribute(name, "standard_name").unwrap_or_default();
+    let others = [
+        (&WIDTH, "widths of spectra"),
+        (&SIGMA, "standard deviations of velocities"),
+        (&NYQUIST, "Nyquist velocities"),
+    ];
+    for (known, what) in others {
+        if known.names.split(' ').any(|own| is_column(name, own))
+            || known.standard_names.contains(&standard_name)
+        {
+            return Err(format!("--field {name}: it holds {what}, not velocities"));
+        }
+    }
+    Ok(())
 }
 
 /// Whether the name of a column without its unit is this one, in small or capital letters, with blanks or hyphens for the

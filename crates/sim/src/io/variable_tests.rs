@@ -127,6 +127,27 @@ fn variables_are_found_by_their_names_and_standard_names() {
 }
 
 #[test]
+fn what_is_no_velocity_is_refused_as_one() {
+    for (attributes, name) in [
+        (vec![("standard_name", "doppler_spectrum_width")], "x"),
+        (vec![], "SPECTRUM_WIDTH"),
+        (vec![], "radial_velocity_error_m_s"),
+        (vec![], "nyquist_velocity"),
+    ] {
+        let file = Given::numbers(name, &attributes, &[]);
+        let refused = refuse_other_than_velocity(&file, name);
+        assert!(refused.is_err(), "{name}");
+    }
+    let table = table("width_m_s,v_corrected_m_s\n1,5\n");
+    let refused = refuse_other_than_velocity(&table, "width_m_s").unwrap_err();
+    assert!(refused.contains("--field width_m_s"), "{refused}");
+    assert_eq!(
+        refuse_other_than_velocity(&table, "v_corrected_m_s"),
+        Ok(())
+    );
+}
+
+#[test]
 fn ratios_are_the_same_in_decibel_as_ratio_and_as_ratio_plus_one() {
     let decibel = [-13.0, -10.0, 3.0];
     let linear = decibel.map(|db: f64| 10f64.powf(0.1 * db));

@@ -80,9 +80,9 @@ impl FoundWind {
         vector
     }
 
-    /// What velocities of gates that overlap add to the covariance of the components beyond independent noise of these deviations, m²/s²:
-    /// gates of one ray share fewer samples the farther they are apart, and none from `stride` gates on.
-    pub(super) fn shared_noise_m2_s2(
+    /// Covariance of the components from noise of these deviations, m²/s². Gates of one ray share fewer samples of it the farther they are
+    /// apart, and none from `stride` gates on.
+    pub(super) fn noise_covariance_m2_s2(
         &self,
         stride: usize,
         std_m_s: impl Fn(&Cell) -> f64,
@@ -90,9 +90,12 @@ impl FoundWind {
         let mut order: Vec<usize> = (0..self.used.len()).collect();
         order.sort_by_key(|index| (self.used[*index].line, self.used[*index].gate));
         let count = self.gain.nrows();
-        let mut shared = Array2::zeros((count, count));
+        let mut noise = Array2::zeros((count, count));
         for (at, i) in order.iter().enumerate() {
             let one = &self.used[*i];
+            for ((a, b), sum) in noise.indexed_iter_mut() {
+                *sum += std_m_s(one).powi(2) * self.gain[[a, *i]] * self.gain[[b, *i]];
+            }
             for j in &order[at + 1..] {
                 let other = &self.used[*j];
                 let apart = other.gate.abs_diff(one.gate);
@@ -101,14 +104,28 @@ impl FoundWind {
                 }
                 let part = 1.0 - apart as f64 / stride as f64;
                 let covariance = part * std_m_s(one) * std_m_s(other);
-                for ((a, b), sum) in shared.indexed_iter_mut() {
+                for ((a, b), sum) in noise.indexed_iter_mut() {
                     let both = self.gain[[a, *i]] * self.gain[[b, *j]]
                         + self.gain[[a, *j]] * self.gain[[b, *i]];
                     *sum += covariance * both;
                 }
             }
         }
-        shared
+        noise
+    }
+
+    /// Numbers of at most `most` of the velocities, increasing: equally many of each direction, whatever the order in which the beams take turns.
+    pub(super) fn thinned(&self, most: usize) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.used.len()).collect();
+        order.sort_by(|i, j| {
+            let [one, other] = [i, j].map(|index| self.used[*index].direction);
+            let by_azimuth = one[0].atan2(one[1]).total_cmp(&other[0].atan2(other[1]));
+            by_azimuth.then(one[2].total_cmp(&other[2]))
+        });
+        let stride = order.len().div_ceil(most).max(1);
+        let mut chosen: Vec<usize> = order.into_iter().step_by(stride).collect();
+        chosen.sort_unstable();
+        chosen
     }
 
     /// Probabilities of the velocities of this bin to be good.

@@ -148,7 +148,8 @@ pub(super) fn row(
     }
     let covariance = match in_turbulence {
         Some(covariance) => covariance,
-        None => of_residuals(found, options.gate_stride),
+        // as if the residuals were noise
+        None => found.noise_covariance_m2_s2(options.gate_stride, |_| found.fit.std_m_s),
     };
     add_wind(&mut row, found, with_unknown_up(found, covariance));
     Ok(row)
@@ -206,13 +207,6 @@ fn add_turbulence(row: &mut WindRow, layer: &LayerTurbulence, outer_scales: &[(f
     {
         row.flags.push(Flag::OuterScaleAtEdge);
     }
-}
-
-/// Covariance of the components if the residuals are noise, m²/s².
-fn of_residuals(found: &FoundWind, gate_stride: usize) -> Array2<f64> {
-    let std_m_s = found.fit.std_m_s;
-    let independent = found.gain.dot(&found.gain.t()) * (std_m_s * std_m_s);
-    independent + found.shared_noise_m2_s2(gate_stride, |_| std_m_s)
 }
 
 /// The covariance with what an unknown vertical wind adds to the other components, and with the variance of its own.

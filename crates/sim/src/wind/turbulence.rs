@@ -300,13 +300,11 @@ impl RunTurbulence {
             return Ok(None);
         };
         let carried_m_s = self.carried_m_s.get(&key).copied().unwrap_or_default();
-        let stride = found.used.len().div_ceil(MOST_SHARED).max(1);
-        let chosen: Vec<usize> = (0..found.used.len()).step_by(stride).collect();
-        let mut gates = Vec::with_capacity(chosen.len());
-        let mut noise_m2_s2 = Vec::with_capacity(chosen.len());
+        let chosen = found.thinned(MOST_SHARED);
         let gain = found.gain.select(ndarray::Axis(1), &chosen);
         // The gains of all velocities are those of fewer ones, larger.
         let gain = gain * (found.used.len() as f64 / chosen.len() as f64);
+        let mut gates = Vec::with_capacity(chosen.len());
         for index in chosen {
             let cell = &found.used[index];
             let time_s = rays[cell.line].time_s;
@@ -317,20 +315,18 @@ impl RunTurbulence {
                 time_s,
                 carried_m_s,
             ));
-            noise_m2_s2.push(turbulence.variance_m2_s2(cell) / stride as f64);
         }
         let weights = &turbulence.eps23_weights;
-        let covariance = wakescope_estimate::wind_profile::wind_covariance(
+        let of_air = wakescope_estimate::wind_profile::wind_covariance(
             gain.view(),
             &gates,
-            &noise_m2_s2,
             covariance,
             weights,
         )?;
-        let shared = found.shared_noise_m2_s2(options.gate_stride, |cell| {
+        let of_noise = found.noise_covariance_m2_s2(options.gate_stride, |cell| {
             turbulence.variance_m2_s2(cell).sqrt()
         });
-        Ok(Some(covariance + shared))
+        Ok(Some(of_air + of_noise))
     }
 }
 

@@ -6,6 +6,7 @@ use super::estimate::{npy, npz, samples};
 use super::score::data_set;
 use super::wakescope;
 use rayon::prelude::*;
+use std::cell::LazyCell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -380,7 +381,7 @@ fn value(command: &str, option: &str) -> Option<&'static [&'static str]> {
         (_, "motion") => &["yes"],
         (_, "threshold") => &["1e9"],
         (_, "lidar-height") => &["2"],
-        (_, "field") => &["sigma_m_s"],
+        (_, "field") => &["raw_m_s"],
         (_, "min-snr") => &["99"],
         (_, "kind") => &["up"],
         (_, "every") => &["7"],
@@ -439,7 +440,7 @@ fn files(folder: &Path) -> Files {
 /// A cone with two vertical beams, some velocities flagged, in noise and turbulence of a kind.
 fn fan() -> String {
     let mut text = String::from(
-        "time_s,azimuth_deg,elevation_deg,range_m,velocity_m_s,sigma_m_s,snr_db,flagged\n",
+        "time_s,azimuth_deg,elevation_deg,range_m,velocity_m_s,raw_m_s,sigma_m_s,snr_db,flagged\n",
     );
     for beam in 0..14 {
         for gate in 0..12 {
@@ -453,7 +454,7 @@ fn fan() -> String {
             let range_m = 100 + 30 * gate;
             let flagged = u8::from(beam == 3);
             text += &format!(
-                "{beam},{azimuth_deg},{elevation_deg},{range_m},{velocity_m_s},0.3,{gate},{flagged}\n"
+                "{beam},{azimuth_deg},{elevation_deg},{range_m},{velocity_m_s},{level},0.3,{gate},{flagged}\n"
             );
         }
     }
@@ -571,13 +572,13 @@ fn table(map: &Path, is_timed: bool) -> String {
     let map = TextTable::read(map).unwrap();
     let columns = ["range_m", "elevation_rad", "v_scan_m_s", "snr_db"];
     let columns = columns.map(|name| map.column(name).unwrap());
-    let mut text = String::from("range_m,elevation_rad,velocity_m_s,snr_db,sigma_m_s");
+    let mut text = String::from("range_m,elevation_rad,velocity_m_s,snr_db,raw_m_s,sigma_m_s");
     text += if is_timed { ",time_s\n" } else { "\n" };
     for row in 0..map.rows.len() {
         for column in columns {
             text += &format!("{:?},", map.number(row, column));
         }
-        text += "0.5";
+        text += "0.4,0.5";
         if is_timed {
             text += &format!(",{}", 100.0 * map.number(row, columns[1]));
         }
@@ -655,7 +656,8 @@ fn idle(definition: &clap::Command, place: &Place<'_>, kind: &Kind) -> Vec<Strin
         let words: Vec<&str> = kind.before.split_whitespace().collect();
         place.given(&nothing, &words).2
     };
-    let again = place.given(&before, &base);
+    // Only some kinds have an option that needs it.
+    let again = LazyCell::new(|| place.given(&before, &base));
     let mut idle = Vec::new();
     for argument in command.get_arguments() {
         let Some(option) = argument.get_long() else {
@@ -672,7 +674,7 @@ fn idle(definition: &clap::Command, place: &Place<'_>, kind: &Kind) -> Vec<Strin
             .unwrap_or_else(|| panic!("{} --{option} is not known to this test", kind.command));
         let words = [&base[..], &[&long], value].concat();
         let is_idle = if AFTER_A_RUN.contains(&option) {
-            place.given(&before, &words) == again
+            place.given(&before, &words) == *again
         } else {
             place.given(&nothing, &words) == fresh
         };

@@ -444,7 +444,10 @@ struct VelocityVariable {
 impl VelocityVariable {
     fn new(file: &NetcdfFile, format: &ScanFormat) -> Result<Self, String> {
         let name = match &format.field {
-            Some(name) if file.has(name) => name.clone(),
+            Some(name) if file.has(name) => {
+                variable::refuse_other_than_velocity(file, name)?;
+                name.clone()
+            }
             Some(name) => return Err(format!("it has no variable {name}, which --field names")),
             None => variable::find(file, &VELOCITY)
                 .map(str::to_owned)

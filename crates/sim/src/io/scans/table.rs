@@ -179,7 +179,9 @@ impl<'t> Columns<'t> {
                         column_names(table)
                     )
                 })?;
-                table.header[column].as_str()
+                let name = table.header[column].as_str();
+                variable::refuse_other_than_velocity(table, name)?;
+                name
             }
             None => needed_column(table, &VELOCITY, "velocity_m_s")?,
         };
