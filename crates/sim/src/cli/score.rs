@@ -56,7 +56,7 @@ pub(super) fn score(args: &ScoreArgs, cli: &Cli) -> Result<(), Error> {
         seed: origin.seed,
     };
     let path = &args.predictions;
-    let text = text_file::read(path).map_err(Error::io("read", path))?;
+    let text = text_file::read_data(path).map_err(Error::io("read", path))?;
     let predictions = Predictions::parse(&text, path, &truth, &options)?;
     let scores = score::score(&truth, &predictions, &options);
     let result: Scored<'_> = (&scores, &predictions, &options);

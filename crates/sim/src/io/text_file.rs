@@ -6,6 +6,8 @@ use std::path::Path;
 
 /// Largest scene or case file \[bytes\].
 const LARGEST_BYTES: u64 = 16 << 20;
+/// Largest text of data \[bytes\].
+pub(crate) const LARGEST_DATA_BYTES: u64 = 1 << 30;
 
 /// Opens a regular file; a device may have no end, and a pipe may wait for its writer for ever.
 ///
@@ -101,15 +103,24 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
 /// # Errors
 /// As [`open`]; more than 16 MiB; a compressed file; bytes that are no text in UTF-8 or UTF-16.
 pub(crate) fn read(path: &Path) -> Result<String> {
+    read_at_most(path, LARGEST_BYTES, "no scene and no case is")
+}
+
+/// The text of a file of data.
+///
+/// # Errors
+/// As [`read`], but for more than 1 GiB.
+pub(crate) fn read_data(path: &Path) -> Result<String> {
+    read_at_most(path, LARGEST_DATA_BYTES, "divide it")
+}
+
+fn read_at_most(path: &Path, largest_bytes: u64, remark: &str) -> Result<String> {
     let (file, _) = open(path)?;
     let mut bytes = Vec::new();
     // Files of the system may say that they are empty and still have no end.
-    file.take(LARGEST_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST_BYTES {
-        let reason = format!(
-            "it is larger than {} MiB: no scene and no case is",
-            LARGEST_BYTES >> 20
-        );
+    file.take(largest_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > largest_bytes {
+        let reason = format!("it is larger than {} MiB: {remark}", largest_bytes >> 20);
         return Err(Error::new(ErrorKind::FileTooLarge, reason));
     }
     if let Some((name, program)) = compression(&bytes) {
@@ -145,6 +156,7 @@ mod tests {
             .set_len(LARGEST_BYTES + 1)
             .unwrap();
         assert!(read(&path).unwrap_err().to_string().contains("16 MiB"));
+        assert!(read_data(&path).is_ok());
         assert!(
             read(folder.path())
                 .unwrap_err()

@@ -229,10 +229,13 @@ fn text(path: &Path, length: u64, format: &ScanFormat) -> Result<Found, Error> {
 
 /// The bytes of a text that is not too large.
 fn text_bytes(path: &Path, length: u64) -> Result<Vec<u8>, Error> {
-    if length > LARGEST_TEXT_BYTES {
+    if length > text_file::LARGEST_DATA_BYTES {
         return Err(Error::input(
             path,
-            format!("it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read"),
+            format!(
+                "it has {length} bytes; texts of at most {} are read",
+                text_file::LARGEST_DATA_BYTES
+            ),
         ));
     }
     std::fs::read(path).map_err(Error::io("read", path))
@@ -293,9 +296,6 @@ fn decoded(bytes: &[u8], path: &Path) -> Result<Text, String> {
 
 /// What is said of a variable of velocities in a file that has one column of them.
 const NO_FIELD: &str = "--field has no effect: a HALO file has one column of velocities";
-
-/// Largest text that is read \[bytes\].
-const LARGEST_TEXT_BYTES: u64 = 1 << 30;
 
 #[cfg(test)]
 mod tests {
