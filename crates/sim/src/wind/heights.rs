@@ -14,6 +14,8 @@ const FEW: usize = 16;
 /// Elevations of one cone, degrees, and the least step of heights that are those of gates, m.
 const SAME_ELEVATION_DEG: f64 = 0.2;
 const LEAST_STEP_M: f64 = 0.05;
+/// Heights nearer than this are those of one gate, m.
+const SAME_HEIGHT_M: f64 = 1e-3;
 /// Step of heights of scans of several elevations, m.
 const USUAL_STEP_M: f64 = 25.0;
 
@@ -163,24 +165,29 @@ fn is_up(ray: &Ray) -> bool {
 
 /// Heights of the gates of rays of one slanted elevation, or of vertical ones, increasing, m; none of rays of several elevations.
 fn gate_heights_m(rays: &[Ray]) -> Option<Vec<f64>> {
-    let mut chosen: Option<&Ray> = None;
     let all_up = rays.iter().all(is_up);
-    for ray in rays.iter().filter(|ray| all_up || !is_up(ray)) {
-        let apart_rad = chosen.map_or(0.0, |chosen| {
-            ray.direction()[2].asin() - chosen.direction()[2].asin()
-        });
-        if apart_rad.abs() > SAME_ELEVATION_DEG.to_radians() {
-            return None;
-        }
-        if chosen.is_none_or(|chosen| ray.range_m.len() > chosen.range_m.len()) {
-            chosen = Some(ray);
-        }
+    let own: Vec<&Ray> = rays.iter().filter(|ray| all_up || !is_up(ray)).collect();
+    let longest = own.iter().rev().max_by_key(|ray| ray.range_m.len())?;
+    let up = longest.direction()[2];
+    let mut apart_rad = own.iter().map(|ray| ray.direction()[2].asin() - up.asin());
+    if apart_rad.any(|apart_rad| apart_rad.abs() > SAME_ELEVATION_DEG.to_radians()) {
+        return None;
     }
-    let chosen = chosen?;
-    let up = chosen.direction()[2];
-    let mut heights_m: Vec<f64> = chosen.range_m.iter().map(|range_m| range_m * up).collect();
+    // A ray need not have all gates, and in a table without their order each may have one.
+    let of_all = own.iter().flat_map(|ray| &ray.range_m);
+    stepped_heights_of_gates_m(of_all, up)
+        .or_else(|| stepped_heights_of_gates_m(longest.range_m.iter(), up))
+}
+
+/// Heights of different ranges along one elevation, increasing, m; none if there are less than two or some are too near to one another.
+fn stepped_heights_of_gates_m<'r>(
+    range_m: impl Iterator<Item = &'r f64>,
+    up: f64,
+) -> Option<Vec<f64>> {
+    let mut heights_m: Vec<f64> = range_m.map(|range_m| range_m * up).collect();
     heights_m.retain(|height_m| height_m.is_finite());
     heights_m.sort_by(f64::total_cmp);
+    heights_m.dedup_by(|next, last| *next - *last < SAME_HEIGHT_M);
     let is_stepped = |pair: &[f64]| pair[1] - pair[0] >= LEAST_STEP_M;
     (heights_m.len() > 1 && heights_m.windows(2).all(is_stepped)).then_some(heights_m)
 }

@@ -331,7 +331,18 @@ fn odd_input_gives_what_it_determines() {
         cells[1] += 180.0;
         cells[2] = 120.0;
     });
-    for other in [winds(&backward, ""), winds(&over, "")] {
+    // Gate by gate instead of ray by ray: each row is a ray of one gate.
+    let by_gate = csv(folder, "g.csv", 96, |row, cells| {
+        let beam = row % 24;
+        let gate = row / 24;
+        let (sin, cos) = (30.0 * beam as f64).to_radians().sin_cos();
+        let ripple = 0.1 * (1.7 * (4 * beam + gate) as f64).sin();
+        let velocity_m_s = 0.5 * (4.0 * sin - 3.0 * cos) + ripple;
+        let range_m = 100.0 + 30.0 * gate as f64;
+        *cells = [beam as f64, 30.0 * beam as f64, 60.0, range_m, velocity_m_s];
+    });
+    for other in [winds(&backward, ""), winds(&over, ""), winds(&by_gate, "")] {
+        assert_eq!(other.len(), forward.len());
         for (a, b) in forward.iter().zip(&other) {
             assert!(
                 (number(a, "east_m_s") - number(b, "east_m_s")).abs() < 0.05,
