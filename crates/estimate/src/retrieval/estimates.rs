@@ -46,6 +46,7 @@ pub(super) fn fit_estimates(
             secondary: options.secondary,
             least_statistic: options.threshold_of_estimates,
             correlated_lines: estimator.correlated_lines(spacing_rad, range_m),
+            fold_m_s: map.fold_m_s,
             ..MapFitOptions::default()
         },
         observed_range_m: {

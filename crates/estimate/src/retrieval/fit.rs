@@ -8,6 +8,7 @@
 //! Check: the reference maps; scatter, bias and stated standard errors over many maps of either kind.
 
 use crate::error::Error;
+use crate::retrieval::aliases::Unfolded;
 use crate::retrieval::estimates::fit_estimates;
 use crate::retrieval::gate_means::fit_means;
 use crate::retrieval::secondary::with_secondary_vortices;
@@ -51,9 +52,17 @@ pub fn fit_scan(
     };
     rough.free.core_radius = Sharing::Fixed;
     let found = fit_means(independent, &rough)?;
-    let Some(mut fit) = fit_estimates(&strided, estimator, options, &found) else {
+    // Guesses and starts do not know that velocities repeat.
+    let unfolded = match &found.wake {
+        Some(wake) => strided.unfolded_about(&options.model, wake),
+        None => Unfolded::new(&strided, options)?.map,
+    };
+    let Some(mut fit) = fit_estimates(&unfolded, estimator, options, &found) else {
         return fit_as_means(independent, options, false);
     };
+    if map.fold_m_s.is_some() && found.has(Flag::Ambiguous) {
+        fit.set(Flag::Ambiguous, true);
+    }
     if is_likely {
         let means = fit_means(independent, options)?;
         fit.add_distance_from(&means, map);

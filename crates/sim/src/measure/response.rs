@@ -10,10 +10,11 @@ use crate::plan::estimators::{Response, response};
 use crate::plan::{Plan, Target};
 use crate::progress::Observer;
 use crate::scene::{Scene, SceneFile};
-use wakescope_estimate::Radius;
 use wakescope_estimate::bound::Noise;
 use wakescope_estimate::retrieval::ScanEstimator;
 use wakescope_estimate::vortex_fit::{EstimatorResponse, ScanSetup, WakeModel};
+use wakescope_estimate::window::Sample;
+use wakescope_estimate::{Correlogram, Estimator, Radius};
 
 /// Pulse, noise and signal-to-noise ratio of a scene's signals, and the estimator of its maps.
 pub struct SceneResponse {
@@ -50,9 +51,7 @@ impl SceneResponse {
         };
         let of_rays = RayInformation::new(plan, &layer_snr)?;
         let radius = region_radius(&of_rays, &places(scene, &plan.geometry)?)?;
-        let response = response(scene, pulse, median_snr(&layer_snr))
-            .ok()
-            .flatten();
+        let response = response(scene, pulse, median_snr(&layer_snr)).ok();
         let noise_power_a2 = plan.instrument.receiver.sampled_noise_a2();
         Ok(Some(Self {
             scene: scene.clone(),
@@ -79,6 +78,24 @@ impl SceneResponse {
         self.radius.at_m(range_m).unwrap_or(0.0)
     }
 
+    /// What the estimator shows at about a range, each line for itself.
+    fn of_lines<'r, S: Sample>(
+        &'r self,
+        correlogram: &Correlogram<S>,
+        estimator: &'r dyn Estimator,
+        range_m: f64,
+    ) -> Result<EstimatorResponse<'r>, Error> {
+        let noise = (self.noise, self.snr_at(range_m));
+        Ok(EstimatorResponse::new(
+            correlogram,
+            estimator,
+            &self.scene.sampling()?,
+            self.pulse_sigma_s,
+            noise,
+            0.0,
+        )?)
+    }
+
     /// How the records of lines at elevations, rad, were taken.
     pub(crate) fn setup(
         &self,
@@ -100,21 +117,12 @@ impl SceneResponse {
 }
 
 impl ScanEstimator for SceneResponse {
-    /// Nothing for complex signals.
     fn response(&self, range_m: f64) -> Option<EstimatorResponse<'_>> {
-        let (correlogram, estimator) = self.response.as_ref()?;
-        let noise = (self.noise, self.snr_at(range_m));
-        let sampling = self.scene.sampling().ok()?;
-        let of_lines = EstimatorResponse::new(
-            correlogram,
-            &**estimator,
-            &sampling,
-            self.pulse_sigma_s,
-            noise,
-            0.0,
-        )
-        .ok()?;
-        Some(of_lines.with_radius(|range_m| self.radius_m(range_m)))
+        let of_lines = match self.response.as_ref()? {
+            Response::Real(all, estimator) => self.of_lines(all, &**estimator, range_m),
+            Response::Complex(all, estimator) => self.of_lines(all, &**estimator, range_m),
+        };
+        Some(of_lines.ok()?.with_radius(|range_m| self.radius_m(range_m)))
     }
 
     fn correlated_lines(&self, spacing_rad: f64, range_m: f64) -> usize {

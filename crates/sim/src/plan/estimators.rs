@@ -298,20 +298,33 @@ pub(crate) fn grid_step_and_bias_m_s(scene: &Scene) -> Result<(f64, f64), Error>
 }
 
 /// Correlogram of all lags and the scene's estimator of it, for the mean of very many pulses.
-pub(crate) type Response = (Correlogram<f64>, Box<dyn Estimator>);
+pub(crate) enum Response {
+    /// Of real samples.
+    Real(Correlogram<f64>, Box<dyn Estimator>),
+    /// Of complex samples.
+    Complex(Correlogram<Complex<f64>>, Box<dyn Estimator>),
+}
 
-/// The response of a scene at a signal-to-noise ratio `snr`; none for complex signals.
+/// The response of a scene at a signal-to-noise ratio `snr`.
 ///
 /// # Errors
 /// Fails if the estimators refuse the scene; a checked scene is not refused.
-pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<Response>, Error> {
-    if scene.signal_kind() == SignalKind::Complex {
-        return Ok(None);
-    }
+pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Response, Error> {
+    let kind = scene.signal_kind();
     let method = scene.estimator.method.behaviour();
-    let correlogram = Correlogram::with_tapers(method.tapers(scene, pulse, snr)?)?;
-    let estimator = method.estimator(scene, SignalKind::Real, &correlogram.lag_weights())?;
-    Ok(Some((correlogram, estimator)))
+    let tapers = method.tapers(scene, pulse, snr)?;
+    Ok(match kind {
+        SignalKind::Real => {
+            let all = Correlogram::with_tapers(tapers)?;
+            let estimator = method.estimator(scene, kind, &all.lag_weights())?;
+            Response::Real(all, estimator)
+        }
+        SignalKind::Complex => {
+            let all = Correlogram::with_tapers(tapers)?;
+            let estimator = method.estimator(scene, kind, &all.lag_weights())?;
+            Response::Complex(all, estimator)
+        }
+    })
 }
 
 /// The test against noise; none without noise.

@@ -250,6 +250,8 @@ pub struct MapFitOptions {
     pub least_statistic: f64,
     /// Neighbouring lines that share windows: 2 rho over their distance for an accumulated map, 0 for independent lines.
     pub correlated_lines: usize,
+    /// Velocities repeat after this width \[m/s\]; they are given about those of a likely wake.
+    pub fold_m_s: Option<f64>,
 }
 
 impl Default for MapFitOptions {
@@ -266,6 +268,7 @@ impl Default for MapFitOptions {
             secondary: Secondary::Auto,
             least_statistic: 35.0,
             correlated_lines: 8,
+            fold_m_s: None,
         }
     }
 }

@@ -60,7 +60,7 @@ impl Setting<'_, '_> {
         let prior = self.options.core_prior;
         LeastSquares {
             prediction,
-            fold_m_s: None,
+            fold_m_s: self.options.fold_m_s,
             cells,
             whitening: None,
             loss,
@@ -257,13 +257,14 @@ impl Setting<'_, '_> {
                 && here.slopes.iter().all(|slope| slope[place].is_finite())
         });
         if let Some(variances) = self.prediction.air_variances(p) {
-            let deviations = learnt_deviations(&variances, &cells, |cell| residual(cell, &here));
+            let deviations =
+                learnt_deviations(&variances, &cells, |cell| self.residual(cell, &here));
             cells
                 .iter_mut()
                 .zip(deviations)
                 .for_each(|(cell, deviation)| cell.sigma_m_s *= deviation);
         }
-        let scale = robust_scale(cells.iter().map(|cell| residual(cell, &here)));
+        let scale = robust_scale(cells.iter().map(|cell| self.residual(cell, &here)));
         finite("scale of the residuals", scale)?;
         let scale = scale.max(1e-6);
         cells.iter_mut().for_each(|cell| cell.sigma_m_s *= scale);
@@ -276,6 +277,15 @@ impl Setting<'_, '_> {
             scale,
             counted: 1.0,
         })
+    }
+
+    /// Difference of a measured velocity from the predicted one in standard deviations.
+    fn residual(&self, cell: &Cell, predicted: &Predicted) -> f64 {
+        let mut away_m_s = cell.velocity_m_s - predicted.velocity_m_s[[cell.line, cell.gate]];
+        if let Some(fold_m_s) = self.options.fold_m_s {
+            away_m_s -= fold_m_s * (away_m_s / fold_m_s).round();
+        }
+        away_m_s / cell.sigma_m_s
     }
 
     fn outcome(
@@ -325,11 +335,6 @@ impl Setting<'_, '_> {
             }],
         })
     }
-}
-
-/// Difference of a measured velocity from the predicted one in standard deviations.
-fn residual(cell: &Cell, predicted: &Predicted) -> f64 {
-    (cell.velocity_m_s - predicted.velocity_m_s[[cell.line, cell.gate]]) / cell.sigma_m_s
 }
 
 fn not_converged(iterations: usize, sigmas_left: f64) -> Error {
