@@ -60,6 +60,22 @@ pub struct WakeStatistic {
     pub correlation_error: (f64, f64),
 }
 
+impl WakeStatistic {
+    /// Takes what the best wake leaves for the noise, in place of the deviations that were stated; returns the factor between them. For independent
+    /// noise of one deviation.
+    pub fn take_own_noise(&mut self) -> f64 {
+        let variance = self.wake_chi2_per_dof;
+        if variance.is_nan() || variance <= 0.0 {
+            return 1.0;
+        }
+        self.value /= variance;
+        self.wind_chi2_per_dof /= variance;
+        self.wake_chi2_per_dof = 1.0;
+        self.circulation_std_m2_s *= variance.sqrt();
+        variance.sqrt()
+    }
+}
+
 impl WakeDetector {
     /// Velocities that a test needs.
     pub const NEEDED: usize = 40;

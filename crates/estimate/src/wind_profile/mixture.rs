@@ -42,7 +42,7 @@ pub struct RadialVelocities<'a> {
     pub rows: ArrayView2<'a, f64>,
     /// Velocities \[m/s\], all finite.
     pub velocity_m_s: &'a [f64],
-    /// Half the width of the band of bad velocities \[m/s\].
+    /// Half the width of the band of bad velocities that do not repeat \[m/s\]; that of others is half the width after which they do.
     pub half_band_m_s: f64,
     /// Width after which each velocity repeats \[m/s\], infinite for one that does not; empty if none does.
     pub folds_m_s: &'a [f64],
@@ -157,17 +157,25 @@ impl RadialVelocities<'_> {
         }
     }
 
-    /// Density of a residual over that of bad velocities.
-    fn density_ratio(&self, residual_m_s: f64, std_m_s: f64) -> f64 {
+    /// Width of the band in which a velocity is if it is bad \[m/s\].
+    fn band_m_s(&self, index: usize) -> f64 {
+        match self.folds_m_s.get(index) {
+            Some(fold_m_s) if fold_m_s.is_finite() => *fold_m_s,
+            _ => 2.0 * self.half_band_m_s,
+        }
+    }
+
+    /// Density of the residual of a velocity over that of bad ones.
+    fn density_ratio(&self, index: usize, residual_m_s: f64, std_m_s: f64) -> f64 {
         let deviations = residual_m_s / std_m_s;
-        let height = 2.0 * self.half_band_m_s / (std_m_s * (2.0 * std::f64::consts::PI).sqrt());
+        let height = self.band_m_s(index) / (std_m_s * (2.0 * std::f64::consts::PI).sqrt());
         height * (-0.5 * deviations * deviations).exp()
     }
 
     fn likelihood(&self, wind_m_s: &[f64], std_m_s: f64, bad_fraction: f64) -> f64 {
         let mut sum = 0.0;
         for i in 0..self.velocity_m_s.len() {
-            let ratio = self.density_ratio(self.residual_m_s(i, wind_m_s), std_m_s);
+            let ratio = self.density_ratio(i, self.residual_m_s(i, wind_m_s), std_m_s);
             sum += ((1.0 - bad_fraction) * ratio + bad_fraction).ln();
         }
         sum
@@ -279,7 +287,7 @@ impl RadialVelocities<'_> {
         let mut residuals = Vec::with_capacity(self.velocity_m_s.len());
         for i in 0..self.velocity_m_s.len() {
             let residual = self.residual_m_s(i, wind_m_s);
-            let good = (1.0 - bad_fraction) * self.density_ratio(residual, std_m_s);
+            let good = (1.0 - bad_fraction) * self.density_ratio(i, residual, std_m_s);
             weights.push(good / (good + bad_fraction));
             residuals.push(residual);
         }

@@ -167,6 +167,35 @@ fn winds_among_bad_velocities_are_the_best_fits_of_the_table() {
     }
 }
 
+/// Velocities that repeat after 10 m/s, in noise alone: their band is that of the receiver, whatever is taken for others.
+#[test]
+fn noise_of_a_narrow_receiver_is_no_wind() {
+    let mut directions = Vec::new();
+    let mut velocity_m_s = Vec::new();
+    for number in 0..72 {
+        let (sin, cos) = (0.261_799_4 * f64::from(number % 24)).sin_cos();
+        directions.extend([0.5 * sin, 0.5 * cos, 0.866_025_4]);
+        let chance = (0.618_033_988 * f64::from(number * number + 7 * number)).fract();
+        velocity_m_s.push(10.0 * chance - 5.0);
+    }
+    let data = RadialVelocities {
+        rows: ndarray::ArrayView2::from_shape((72, 3), &directions).unwrap(),
+        velocity_m_s: &velocity_m_s,
+        half_band_m_s: 10.0,
+        folds_m_s: &[10.0; 72],
+    };
+    let fit = fit_mixture(&data, None).unwrap().unwrap();
+    assert!(!fit.is_accepted(), "{fit:?}");
+    let fit = fit_mixture(
+        &RadialVelocities {
+            folds_m_s: &[],
+            ..data
+        },
+        None,
+    );
+    assert!(fit.unwrap().unwrap().likelihood > 20.0);
+}
+
 #[test]
 fn noise_is_no_wind() {
     let (fit, _) = mixture("noise24");

@@ -159,13 +159,32 @@ fn add_gate(
         observer.warn(&format!("{}: {note}", first.path.display()));
     }
     options.gate_std_m = gate.std_m();
-    options.gate_stride = first
-        .gate_stride
-        .max(overlapping(first, options.gate_std_m));
+    for sweep in sweeps {
+        let own = sweep
+            .gate_stride
+            .max(overlapping(sweep, options.gate_std_m));
+        options.gate_stride = options.gate_stride.max(own);
+    }
     if let Some(scene) = content {
         options.gate_stride = wind::gate_stride(scene);
     }
+    let other = sweeps.iter().find(|sweep| {
+        !are_alike(sweep.pulse_width_s, first.pulse_width_s)
+            || !are_alike(sweep.gate_length_m, first.gate_length_m)
+    });
+    if let Some(other) = other.filter(|_| stated_m.is_none()) {
+        observer.warn(&format!(
+            "{}: its pulse or gates are others than those of {}, whose weight is taken for all: give files of one kind at a time",
+            other.path.display(),
+            first.path.display()
+        ));
+    }
     Ok(scene)
+}
+
+/// Whether two lengths differ by no more than a tenth, if both are known.
+fn are_alike(a: Option<f64>, b: Option<f64>) -> bool {
+    a.zip(b).is_none_or(|(a, b)| (a / b - 1.0).abs() < 0.1)
 }
 
 /// Gates of a sweep whose weights have widths, at half their heights, from one to the next; at least 1.

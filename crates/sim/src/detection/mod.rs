@@ -76,6 +76,9 @@ impl Default for DetectionSettings {
     }
 }
 
+/// Part by which the noise of scans without stated deviations may differ from that of a calibration with turbulence.
+const SAME_NOISE: f64 = 0.03;
+
 /// What was found in one scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScanDetection {
@@ -200,6 +203,14 @@ impl Calibration {
         if !same_axes || map.sigma_m_s.is_none() != self.assumed_sigma_m_s.is_some() {
             return false;
         }
+        if let (Some(sigma_m_s), Some(Turbulence::Exponential { .. })) =
+            (self.assumed_sigma_m_s, self.turbulence)
+        {
+            let own_m_s = noise_m_s(&air::with_unit_noise(map), settings);
+            if own_m_s.is_ok_and(|own_m_s| (own_m_s / sigma_m_s - 1.0).abs() > SAME_NOISE) {
+                return false;
+            }
+        }
         let mut both = 0;
         let mut one = 0;
         for (at, velocity_m_s) in map.velocity_m_s.indexed_iter() {
@@ -236,14 +247,21 @@ impl Calibration {
         &self,
         (map, outliers, velocities): &(ScanMap, usize, usize),
     ) -> Result<ScanDetection, Error> {
-        let statistic = self.detector.statistic(map.velocity_m_s.view())?;
+        let mut statistic = self.detector.statistic(map.velocity_m_s.view())?;
+        let mut assumed_sigma_m_s = self.assumed_sigma_m_s;
+        if self.turbulence.is_none()
+            && let Some(sigma_m_s) = &mut assumed_sigma_m_s
+        {
+            // Each scan has the noise that its own best wake leaves, not that of the scan of the calibration.
+            *sigma_m_s *= statistic.take_own_noise();
+        }
         Ok(ScanDetection {
             statistic,
             threshold: self.threshold,
             false_alarm: self.law.false_alarm(statistic.value),
             outliers: *outliers,
             velocities: *velocities,
-            assumed_sigma_m_s: self.assumed_sigma_m_s,
+            assumed_sigma_m_s,
             turbulence: match self.turbulence {
                 Some(Turbulence::VonKarman(found)) => Some(found),
                 _ => None,
@@ -474,6 +492,24 @@ mod tests {
             found[0].is_wake() && (found[0].assumed_sigma_m_s.unwrap() / 0.5 - 1.0).abs() < 0.1,
             "{found:?}"
         );
+    }
+
+    /// Scans that state no deviations have their own noise each, though they share a calibration.
+    #[test]
+    fn a_noisier_scan_has_the_statistic_of_its_own_noise() {
+        let quiet = ScanMap {
+            sigma_m_s: None,
+            ..map(1, 0.0)
+        };
+        let noisy = ScanMap {
+            velocity_m_s: &quiet.velocity_m_s * 1.7,
+            ..quiet.clone()
+        };
+        let (found, _) = detect(&[quiet, noisy], &settings(), &Silent).unwrap();
+        let [quiet, noisy] = [0, 1].map(|scan| &found[scan]);
+        assert!((noisy.statistic.value / quiet.statistic.value - 1.0).abs() < 1e-9);
+        let sigmas = [quiet, noisy].map(|scan| scan.assumed_sigma_m_s.unwrap());
+        assert!((sigmas[1] / sigmas[0] - 1.7).abs() < 1e-9, "{sigmas:?}");
     }
 
     #[test]

@@ -19,6 +19,9 @@ const SAME_HEIGHT_M: f64 = 1e-3;
 /// Step of heights of scans of several elevations, m.
 const USUAL_STEP_M: f64 = 25.0;
 
+/// Steps of a sequence of low discrepancy in two dimensions (Roberts 2018, the R2 sequence).
+const STEPS: [f64; 2] = [0.754_877_666_2, 0.569_840_291_0];
+
 /// A velocity of one gate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {
@@ -116,18 +119,26 @@ impl FoundWind {
         noise
     }
 
-    /// Numbers of at most `most` of the velocities, increasing: equally many of each direction, whatever the order in which the beams take turns.
-    pub(super) fn thinned(&self, most: usize) -> Vec<usize> {
+    /// Two choices of at most `most` of the velocities, each with the number of velocities that it stands for: one of each run of velocities of the
+    /// same direction. Sums over all pairs of velocities have, in the mean over choices, those over pairs of one of each; of a single choice
+    /// taken twice each velocity would be paired with itself, for all of its run.
+    pub(super) fn thinned(&self, most: usize) -> [Vec<(usize, f64)>; 2] {
         let mut order: Vec<usize> = (0..self.used.len()).collect();
         order.sort_by(|i, j| {
             let [one, other] = [i, j].map(|index| self.used[*index].direction);
             let by_azimuth = one[0].atan2(one[1]).total_cmp(&other[0].atan2(other[1]));
             by_azimuth.then(one[2].total_cmp(&other[2]))
         });
-        let stride = order.len().div_ceil(most).max(1);
-        let mut chosen: Vec<usize> = order.into_iter().step_by(stride).collect();
-        chosen.sort_unstable();
-        chosen
+        let length = order.len().div_ceil(most).max(1);
+        STEPS.map(|step| {
+            let mut chosen = Vec::with_capacity(most);
+            for (number, run) in order.chunks(length).enumerate() {
+                let part = (0.5 + step * number as f64).fract();
+                let index = (part * run.len() as f64) as usize;
+                chosen.push((run[index.min(run.len() - 1)], run.len() as f64));
+            }
+            chosen
+        })
     }
 
     /// Probabilities of the velocities of this bin to be good.
@@ -313,7 +324,7 @@ fn rows(cells: &[Cell], axes: &[[f64; 3]], heights: &[f64], has_slopes: bool) ->
     })
 }
 
-/// The wind of one bin.
+/// The wind of one bin, from its own velocities or those of neighbours too where it has few.
 fn wind_of(
     bins: &[Bin],
     number: usize,
@@ -327,7 +338,28 @@ fn wind_of(
     if axes.is_empty() {
         return Ok(BinWind::Undetermined);
     }
-    let range = stack(bins, number);
+    let mut found = BinWind::Undetermined;
+    // Neighbours without velocities do not determine slopes over height.
+    for range in [stack(bins, number), number..number + 1] {
+        let of = (bins, number, range);
+        found = wind_of_bins(of, &axes, half_band_m_s, below_m_s)?;
+        if !matches!(found, BinWind::Undetermined) {
+            break;
+        }
+    }
+    if let BinWind::Found(found) = &mut found {
+        found.has_no_up = axes.len() < components.axes.len();
+    }
+    Ok(found)
+}
+
+/// The wind of one bin from the velocities of a range of bins, linear in height if these are several.
+fn wind_of_bins(
+    (bins, number, range): (&[Bin], usize, std::ops::Range<usize>),
+    axes: &[[f64; 3]],
+    half_band_m_s: f64,
+    below_m_s: Option<&[f64]>,
+) -> Result<BinWind, Error> {
     let has_few_cells = range.len() > 1;
     let used: Vec<Cell> = bins[range.clone()]
         .iter()
@@ -337,7 +369,7 @@ fn wind_of(
     let first_own = before.map(|bin| bin.cells.len()).sum();
     let heights = heights_over(bins, number, range);
     let count = axes.len();
-    let rows = rows(&used, &axes, &heights, has_few_cells);
+    let rows = rows(&used, axes, &heights, has_few_cells);
     let velocities: Vec<f64> = used.iter().map(|cell| cell.velocity_m_s).collect();
     let folds = used.iter().map(|cell| cell.fold_m_s);
     let folds_m_s: Vec<f64> = folds.map(|fold| fold.unwrap_or(f64::INFINITY)).collect();
@@ -364,9 +396,9 @@ fn wind_of(
     fit.wind_m_s.truncate(count);
     Ok(BinWind::Found(Box::new(FoundWind {
         gain: gain.slice(s![..count, ..]).to_owned(),
-        has_no_up: count < components.axes.len(),
+        has_no_up: false,
         has_few_cells,
-        axes,
+        axes: axes.to_vec(),
         fit,
         used,
         first_own,

@@ -94,6 +94,8 @@ pub struct WindProfiles {
 
 /// Half the band of bad velocities is at least this, m/s.
 const LEAST_HALF_BAND_M_S: f64 = 10.0;
+/// Fraction of the velocities that tells the band.
+const NEARLY_ALL: f64 = 0.99;
 
 /// The winds of windows, whose times count from `reference`.
 ///
@@ -155,16 +157,22 @@ pub fn wind_profiles(
     })
 }
 
-/// Half the band of bad velocities: the fastest velocity of all, m/s.
+/// Half the band of bad velocities that do not repeat, m/s: that of uniform ones with the same velocity below which nearly all are. The fastest
+/// may be a single wrong number.
 fn half_band_m_s(windows: &[Window]) -> f64 {
-    let mut fastest_m_s = LEAST_HALF_BAND_M_S;
+    let mut speeds_m_s = Vec::new();
     for ray in windows.iter().flat_map(|window| &window.rays) {
-        for velocity_m_s in &ray.velocity_m_s {
-            // The larger of two of which one is missing is the other one.
-            fastest_m_s = fastest_m_s.max(velocity_m_s.abs());
+        if ray.fold_m_s.is_none() {
+            let known = ray.velocity_m_s.iter().filter(|v| v.is_finite());
+            speeds_m_s.extend(known.map(|velocity_m_s| velocity_m_s.abs()));
         }
     }
-    fastest_m_s
+    if speeds_m_s.is_empty() {
+        return LEAST_HALF_BAND_M_S;
+    }
+    let place = (NEARLY_ALL * (speeds_m_s.len() - 1) as f64).floor() as usize;
+    let (_, nearly_fastest_m_s, _) = speeds_m_s.select_nth_unstable_by(place, f64::total_cmp);
+    (*nearly_fastest_m_s / NEARLY_ALL).max(LEAST_HALF_BAND_M_S)
 }
 
 /// Windows with their vertical beams alone.

@@ -8,6 +8,7 @@ use super::WindOptions;
 use super::heights::{Bin, BinWind, Cell, FoundWind};
 use crate::Error;
 use crate::io::scans::Ray;
+use ndarray::Array2;
 use std::collections::BTreeMap;
 use wakescope_estimate::wind_profile::{
     Block, GateCovariance, GatePosition, GateSample, OUTER_SCALES_M, TurbulenceFit,
@@ -97,13 +98,15 @@ pub(super) fn layers(
         }
     }
     let have_sigmas = have_sigmas(bins);
+    // Without all times it is not known where the air of each line is.
+    let have_times = rays.iter().all(|ray| ray.time_s.is_finite());
     let mut layers = Vec::with_capacity(numbers.len());
     for (number, bins) in numbers {
         let (mean_m_s, height_m) = mean_wind(&bins);
         let known_m_s = carried(height_m, mean_m_s);
         let carried_m_s = known_m_s.unwrap_or_else(|| assumed_m_s(&rays[bins[0].cells[0].line]));
         let (lines, mean_square) = good_samples(&bins, rays, have_sigmas);
-        let is_known = known_m_s.is_some();
+        let is_known = known_m_s.is_some() && have_times;
         let strides = options.gate_stride.max(1);
         let mut blocks = Vec::new();
         for first in 0..strides {
@@ -293,41 +296,38 @@ impl RunTurbulence {
         found: &FoundWind,
         rays: &[Ray],
         options: &WindOptions,
-    ) -> Result<Option<ndarray::Array2<f64>>, Error> {
+    ) -> Result<Option<Array2<f64>>, Error> {
         let key = (window, layer_number(bin.height_m, options.layer_m));
         let layer = self.layers.get(&key).zip(self.covariance.as_ref());
         let Some((turbulence, covariance)) = layer else {
             return Ok(None);
         };
         let carried_m_s = self.carried_m_s.get(&key).copied().unwrap_or_default();
-        let chosen = found.thinned(MOST_SHARED);
-        let gain = found.gain.select(ndarray::Axis(1), &chosen);
-        // The gains of all velocities are those of fewer ones, larger.
-        let gain = gain * (found.used.len() as f64 / chosen.len() as f64);
-        let mut gates = Vec::with_capacity(chosen.len());
-        for index in chosen {
-            let cell = &found.used[index];
-            let time_s = rays[cell.line].time_s;
-            let time_s = if time_s.is_finite() { time_s } else { 0.0 };
-            gates.push(GatePosition::new(
-                cell.direction,
-                cell.range_m,
-                time_s,
-                carried_m_s,
-            ));
-        }
-        let weights = &turbulence.eps23_weights;
         let of_air = wakescope_estimate::wind_profile::wind_covariance(
-            gain.view(),
-            &gates,
+            found.thinned(MOST_SHARED).map(|chosen| {
+                let mut gain = Array2::zeros((found.gain.nrows(), chosen.len()));
+                let mut gates = Vec::with_capacity(chosen.len());
+                for (mut column, (index, count)) in gain.columns_mut().into_iter().zip(chosen) {
+                    column.assign(&(&found.gain.column(index) * count));
+                    gates.push(gate_position(&found.used[index], rays, carried_m_s));
+                }
+                (gain, gates)
+            }),
             covariance,
-            weights,
+            &turbulence.eps23_weights,
         )?;
         let of_noise = found.noise_covariance_m2_s2(options.gate_stride, |cell| {
             turbulence.variance_m2_s2(cell).sqrt()
         });
         Ok(Some(of_air + of_noise))
     }
+}
+
+/// Where the gate of a velocity is in air that is carried along.
+fn gate_position(cell: &Cell, rays: &[Ray], carried_m_s: [f64; 3]) -> GatePosition {
+    let time_s = rays[cell.line].time_s;
+    let time_s = if time_s.is_finite() { time_s } else { 0.0 };
+    GatePosition::new(cell.direction, cell.range_m, time_s, carried_m_s)
 }
 
 /// Largest distance between gates of a layer along one axis times the root of three, m.

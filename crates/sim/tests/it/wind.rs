@@ -310,6 +310,15 @@ fn odd_input_gives_what_it_determines() {
             .all(|row| row["flags"] == "noise" && row["east_m_s"].is_empty()),
         "{rows:?}"
     );
+    // Nor does a single wrong number make wind of noise.
+    let spoiled = csv(folder, "spoiled.csv", 400, |row, cells| {
+        cells[4] = 30.0 * (0.618_033_988 * (row * row + 7 * row) as f64).fract() - 15.0;
+        if row == 17 {
+            cells[4] = -99.0;
+        }
+    });
+    let rows = winds(&spoiled, "");
+    assert!(rows.iter().all(|row| row["flags"] == "noise"), "{rows:?}");
     // Angles that are not there: these rays are skipped.
     let holes = csv(folder, "holes.csv", 96, |row, cells| {
         if row < 8 {
