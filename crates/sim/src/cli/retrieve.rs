@@ -266,7 +266,7 @@ pub(super) fn retrieve(args: &RetrieveArgs, cli: &Cli) -> Result<(), Error> {
     observer.begin(Stage::Retrieval, planes.len() as u64);
     let mut found = of_inputs(args, inputs, planes.len(), &*observer)?;
     observer.end();
-    found.tracks = retrieve::tracks_of(&found.scans)?;
+    found.tracks = retrieve::tracks_of(&found.scans, &*observer)?;
     let is_of_signals = args.method == Method::Signals
         && found
             .scans

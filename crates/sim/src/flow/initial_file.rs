@@ -15,6 +15,9 @@ use std::path::Path;
 use wakescope_les::solver::Ends;
 use wakescope_les::{Direction, Mesh};
 
+/// From the last node of a period to the first of the next one may be so many times the largest distance of two nodes.
+const MOST_OPEN: f64 = 1.5;
+
 /// A node of the target takes its value from these nodes of the source.
 type Taps = Vec<(usize, f64)>;
 
@@ -122,6 +125,9 @@ fn taps(source_m: &[f64], target_m: &[f64], along: &Direction) -> Result<Vec<Tap
             last_m - source_m[0]
         ));
     }
+    if periodic {
+        check_closes(source_m, period_m)?;
+    }
     let count = n.min(4);
     let mut all = Vec::with_capacity(target_m.len());
     for target_m in target_m {
@@ -151,6 +157,24 @@ fn taps(source_m: &[f64], target_m: &[f64], along: &Direction) -> Result<Vec<Tap
         ));
     }
     Ok(all)
+}
+
+/// Refuses two or more nodes that leave a part of a period uncovered, across which the cubic would not be that of the field.
+fn check_closes(source_m: &[f64], period_m: f64) -> Result<(), String> {
+    let (Some(first_m), Some(last_m)) = (source_m.first(), source_m.last()) else {
+        return Ok(());
+    };
+    let distances = source_m.windows(2).map(|pair| pair[1] - pair[0]);
+    let largest_m = distances.fold(0.0, f64::max);
+    let gap_m = period_m - (last_m - first_m);
+    match gap_m > MOST_OPEN * largest_m {
+        true => Err(format!(
+            "the period of {period_m} m of the mesh is not covered by {first_m} to {last_m} m: from the last node to the first of the \
+             next period are {gap_m} m, at most {} m are allowed, {MOST_OPEN} times the largest distance of two nodes",
+            MOST_OPEN * largest_m
+        )),
+        false => Ok(()),
+    }
 }
 
 /// Weights at a position of the polynomial through some nodes, which go on with the period (Lagrange).
@@ -248,5 +272,14 @@ mod tests {
                 .unwrap_err()
                 .contains("twice")
         );
+        // A file of half a period, one whose closing cell is twice the others, and one where it is a little wider.
+        let along = Direction::periodic(8, 0.0, 200.0);
+        let half_m: Vec<f64> = (0..50).map(|i| 1.0 + 2.0 * f64::from(i)).collect();
+        let refused = taps(&half_m, &[150.0], &along).unwrap_err();
+        assert!(refused.contains("not covered by 1 to 99 m"), "{refused}");
+        assert!(refused.contains("102 m, at most 3 m"), "{refused}");
+        let along = Direction::periodic(8, 0.0, 8.0);
+        assert!(taps(&[0.0, 2.0, 4.0], &[1.0], &along).is_err());
+        assert!(taps(&[0.0, 2.5, 5.0], &[1.0], &along).is_ok());
     }
 }

@@ -57,19 +57,20 @@ fn times(file: &NetcdfFile, name: &str) -> Result<FieldTimes, String> {
         if !file.has("time") {
             return Ok((vec![(None, 0.0)], None));
         }
-        let time_s = file.seconds("time")?.first().copied();
-        return Ok((
-            vec![(None, time_s.unwrap_or(0.0))],
-            reference_date(file, "time"),
-        ));
+        let (times_s, reference) = dated_seconds(file, "time")?;
+        let time_s = times_s.first().copied().unwrap_or(0.0);
+        return Ok((vec![(None, time_s)], reference));
     };
     if file.dims(name).and_then(|dims| dims.first().copied()) != Some(dim.as_str()) {
         return Err(format!("{name}: time must be its first dimension"));
     }
     let source = file.coordinate_name(&dim);
     let source = source.or_else(|| file.has("time").then_some("time"));
+    // The texts of WRF say the date, too.
+    let has_texts = file.texts("Times").is_ok();
+    let source = source.filter(|source| !(has_texts && file.has_plain_minutes(source)));
     let (times_s, reference) = match source {
-        Some(source) => (file.seconds(source)?, reference_date(file, source)),
+        Some(source) => dated_seconds(file, source)?,
         None => wrf_times(file)?,
     };
     let mut times = Vec::with_capacity(times_s.len());
@@ -79,10 +80,16 @@ fn times(file: &NetcdfFile, name: &str) -> Result<FieldTimes, String> {
     Ok((times, reference))
 }
 
-/// The date from which a variable counts its times.
-fn reference_date(file: &NetcdfFile, variable: &str) -> Option<UtcTime> {
-    let (date, _) = variable::reference(file, variable)?;
-    Some(date)
+/// The times of a variable in s, after the whole second of the date from which it counts them if it has one.
+fn dated_seconds(file: &NetcdfFile, name: &str) -> Result<(Vec<f64>, Option<UtcTime>), String> {
+    let mut times_s = file.seconds(name)?;
+    let Some((date, fraction_s)) = variable::reference(file, name) else {
+        return Ok((times_s, None));
+    };
+    for time_s in &mut times_s {
+        *time_s += fraction_s;
+    }
+    Ok((times_s, Some(date)))
 }
 
 /// Times of WRF where they are texts alone: in s after the start of the run, or else after the first of them.
@@ -92,17 +99,18 @@ fn wrf_times(file: &NetcdfFile) -> Result<(Vec<f64>, Option<UtcTime>), String> {
     })?;
     let mut dates = Vec::with_capacity(texts.len());
     for text in &texts {
-        let (date, _) = UtcTime::parse_reference(text)
+        let date = UtcTime::parse_reference(text)
             .ok_or("a text of its variable Times is not a date such as 2024-01-31_12:00:00")?;
         dates.push(date);
     }
     let stated = ["SIMULATION_START_DATE", "START_DATE"]
         .iter()
         .find_map(|name| UtcTime::parse_reference(file.global_text(name)?));
-    let start = stated.map(|(date, _)| date).or(dates.first().copied());
+    let start = stated.or(dates.first().copied()).map(|(date, _)| date);
     let mut times_s = Vec::with_capacity(dates.len());
-    for date in dates {
-        times_s.push(start.map_or(0.0, |start| date.seconds_since(start)));
+    for (date, fraction_s) in dates {
+        let later_s = start.map_or(0.0, |start| date.seconds_since(start));
+        times_s.push(later_s + fraction_s);
     }
     Ok((times_s, start))
 }
@@ -332,9 +340,9 @@ mod tests {
     }
 
     /// Writes a file of one field of components that are 1 more at each node, upwards, than at the one below.
-    fn staggered(path: &Path, names: [[&'static str; 3]; 3], time: Variable) {
-        let mut dims = vec![("time", 1)];
-        let mut variables = vec![time];
+    fn staggered(path: &Path, names: [[&'static str; 3]; 3], times: Vec<Variable>) {
+        let mut dims = vec![("time", 1), ("DateStrLen", 21)];
+        let mut variables = times;
         for name in names.concat() {
             if !dims.contains(&(name, 4)) {
                 dims.push((name, 4));
@@ -366,7 +374,8 @@ mod tests {
             [["xf", "yh", "zh"], ["xh", "yf", "zh"], ["xh", "yh", "zf"]],
         ] {
             let time = Variable::new("time", &["time"], Data::f64([10.0]));
-            staggered(&path, names, time.text("units", "seconds since start"));
+            let time = time.text("units", "seconds since start");
+            staggered(&path, names, vec![time]);
             let place = places(&path, "u").unwrap().remove(0);
             assert_eq!((place.time_s, place.reference), (10.0, None));
             for component in read(&place, &["u", "v", "w"].map(str::to_owned)).unwrap().0 {
@@ -382,16 +391,45 @@ mod tests {
         let path = folder.path().join("dated.nc");
         let names = [["x", "y", "z"]; 3];
         let time = Variable::new("time", &["time"], Data::f64([0.5]));
-        staggered(
-            &path,
-            names,
-            time.text("units", "minutes since 2024-1-31 13:00 +01:00"),
-        );
+        let time = time.text("units", "minutes since 2024-1-31 13:00 +01:00");
+        staggered(&path, names, vec![time]);
         let place = places(&path, "u").unwrap().remove(0);
         let date = place.reference.map(|date| date.to_string());
         assert_eq!(
             (place.time_s, date.as_deref()),
             (30.0, Some("2024-01-31T12:00:00Z"))
         );
+    }
+
+    /// The time of the one field of a file in s, and the date from which it counts.
+    fn time_of(times: Vec<Variable>) -> (f64, Option<String>) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("timed.nc");
+        staggered(&path, [["x", "y", "z"]; 3], times);
+        let place = places(&path, "u").unwrap().remove(0);
+        (place.time_s, place.reference.map(|date| date.to_string()))
+    }
+
+    #[test]
+    fn the_fraction_of_a_second_of_a_date_belongs_to_the_times() {
+        let time = Variable::new("time", &["time"], Data::f64([0.25]));
+        let time = time.text("units", "seconds since 2024-01-31 12:00:00.5");
+        let noon = Some("2024-01-31T12:00:00Z".to_owned());
+        assert_eq!(time_of(vec![time]), (0.75, noon.clone()));
+        let text = Data::text("2024-01-31_12:00:00.5");
+        let texts = Variable::new("Times", &["time", "DateStrLen"], text);
+        assert_eq!(time_of(vec![texts]), (0.5, noon));
+    }
+
+    #[test]
+    fn times_of_wrf_without_a_unit_are_its_texts_or_else_minutes() {
+        let minutes = || Variable::new("XTIME", &["time"], Data::f64([5.0]));
+        assert_eq!(time_of(vec![minutes()]), (300.0, None));
+        let stated = minutes().text("units", "s");
+        assert_eq!(time_of(vec![stated]), (5.0, None));
+        let text = Data::text("2024-01-31_12:05:00.0");
+        let texts = Variable::new("Times", &["time", "DateStrLen"], text);
+        let date = Some("2024-01-31T12:05:00Z".to_owned());
+        assert_eq!(time_of(vec![minutes(), texts]), (0.0, date));
     }
 }

@@ -203,17 +203,22 @@ impl NetcdfFile {
             .collect())
     }
 
+    /// Whether a variable holds minutes without saying so in its unit, as XTIME does in files of WRF before 3.8.
+    pub(crate) fn has_plain_minutes(&self, name: &str) -> bool {
+        let units = self.text(name, "units").unwrap_or_default();
+        name.eq_ignore_ascii_case("XTIME") && units.trim().is_empty()
+    }
+
     /// Times in seconds, from the unit of a variable; a date from which they count is ignored.
     ///
     /// # Errors
     /// As [`Self::floats`]; a unit that is no time.
     pub(crate) fn seconds(&self, name: &str) -> Result<Vec<f64>, String> {
-        // Plain numbers are taken for seconds.
-        let is_plain = self.text(name, "units") == Some("1");
-        let unit_s = if is_plain {
-            1.0
-        } else {
-            self.unit(name, Quantity::Time)?
+        let unit_s = match self.text(name, "units") {
+            _ if self.has_plain_minutes(name) => 60.0,
+            // Plain numbers are taken for seconds.
+            Some("1") => 1.0,
+            _ => self.unit(name, Quantity::Time)?,
         };
         Ok(self
             .floats(name)?

@@ -435,8 +435,11 @@ fn says_plus_one(text: &str) -> bool {
     )
 }
 
-/// Whether velocities are positive towards the instrument: by the standard name, or by a remark.
+/// Whether velocities are positive towards the instrument: by the standard name, or by a remark where it says nothing of it.
 pub(crate) fn is_towards(source: &dyn VariableSource, name: &str) -> bool {
+    if is_away(source, name) {
+        return false;
+    }
     let attribute = |attribute| source.attribute(name, attribute).unwrap_or_default();
     if [TOWARDS, SAID_TOWARDS].contains(&attribute("standard_name"))
         || says(attribute("positive"), &["toward"])
@@ -569,6 +572,14 @@ impl Times {
 
 /// Seconds of some hundred years, which are counted from a later date.
 const FAR_S: f64 = 4e9;
+/// Numbers that are dates of these centuries where one writes year, month, day, hour, minute and second behind each other.
+const DATED: Range<f64> = 1.9e13..2.2e13;
+/// Numbers of milliseconds, microseconds and nanoseconds since 1970 from 1973 on, and the unit, s.
+const PARTS_OF_SECONDS: [(Range<f64>, f64); 3] = [
+    (1e11..1e14, 1e-3),
+    (1e14..1e17, 1e-6),
+    (1e17..f64::INFINITY, 1e-9),
+];
 /// Times that are rounded to more than this tell no rays apart, s.
 const COARSE_S: f64 = 1.0;
 /// Times of a day begin anew where they fall by a day less at most this, s.
@@ -620,8 +631,15 @@ fn times_of_numbers(source: &dyn VariableSource, name: &str) -> Result<Times, St
     let numbers = source.numbers(name)?;
     let units = units(source, name).unwrap_or_default();
     let (unit, date) = split_date(units);
-    // Plain numbers are taken for seconds.
+    let is_plain = date.is_none() && matches!(unit, "" | "1");
+    if is_plain
+        && !source.is_single(name)
+        && let Some(dates) = dates_of_digits(&numbers)
+    {
+        return Ok(times_of_texts(name, &dates));
+    }
     let unit_s = match unit {
+        _ if is_plain => Ok(plain_unit_s(&numbers)),
         "1" => Ok(1.0),
         unit => Quantity::Time.si(unit),
     };
@@ -647,6 +665,44 @@ fn times_of_numbers(source: &dyn VariableSource, name: &str) -> Result<Times, St
         },
     };
     Ok(Times { rounded, ..times })
+}
+
+/// The dates of numbers such as 20240131120000; none where there is another number, so that they are something else. Texts of
+/// missing numbers are empty.
+fn dates_of_digits(numbers: &[f64]) -> Option<Vec<String>> {
+    let mut dates = Vec::with_capacity(numbers.len());
+    for number in numbers {
+        if !number.is_finite() {
+            dates.push(String::new());
+            continue;
+        }
+        if !DATED.contains(number) {
+            return None;
+        }
+        let whole = number.floor();
+        let digits = whole as u64;
+        let day = digits / 1_000_000;
+        let clock = digits % 1_000_000;
+        let fraction = format!("{:.3}", number - whole);
+        let fraction = fraction.trim_start_matches('0');
+        dates.push(format!("{day:08}T{clock:06}{fraction}"));
+    }
+    numbers
+        .iter()
+        .any(|number| number.is_finite())
+        .then_some(dates)
+}
+
+/// The unit of numbers that state none, s. Seconds, but where these would be thousands of years after 1970, as milliseconds,
+/// microseconds and nanoseconds since then are.
+fn plain_unit_s(numbers: &[f64]) -> f64 {
+    for (range, unit_s) in PARTS_OF_SECONDS {
+        let mut known = numbers.iter().filter(|number| number.is_finite());
+        if known.all(|number| range.contains(number)) {
+            return unit_s;
+        }
+    }
+    1.0
 }
 
 /// That numbers of 32 bits in units of `unit_s` are rounded too far, in words.

@@ -333,6 +333,51 @@ fn remarks_say_in_many_words_where_velocities_are_positive() {
 }
 
 #[test]
+fn the_standard_name_goes_before_remarks_on_the_sign() {
+    for (attribute, text) in [
+        ("comment", "positive values are towards the lidar"),
+        ("positive", "toward the instrument"),
+    ] {
+        let remark = (attribute, text);
+        let plain = Given::numbers("VEL", &[remark], &[1.0]);
+        assert!(is_towards(&plain, "VEL"), "{text}");
+        let away = Given::numbers("VEL", &[("standard_name", AWAY), remark], &[1.0]);
+        assert!(!is_towards(&away, "VEL"), "{text}");
+    }
+}
+
+#[test]
+fn numbers_of_many_digits_without_a_unit_are_dates() {
+    let dated = table("datetime,b\n20240131120000,1\n,1\n20240131120001.5,1\n");
+    let found = times(&dated, 3).unwrap();
+    let reference = found.reference.map(|date| date.to_string());
+    assert_eq!(reference.as_deref(), Some("2024-01-31T12:00:00Z"));
+    assert_eq!((found.time_s[0], found.time_s[2]), (0.0, 1.5));
+    assert!(found.time_s[1].is_nan());
+    // The 31st of February.
+    let none = times(&table("datetime\n20240231120000\n"), 1).unwrap();
+    assert!(none.not_understood.is_some() && none.time_s[0].is_nan());
+}
+
+#[test]
+fn numbers_without_a_unit_that_are_no_seconds_are_parts_of_them() {
+    for per_second in [1.0, 1e3, 1e6, 1e9] {
+        let stored = [1.7e9, 1.7e9 + 1.5].map(|time_s| time_s * per_second);
+        let text = format!("timestamp\n{}\n{}\n", stored[0], stored[1]);
+        let found = times(&table(&text), 2).unwrap();
+        assert_eq!(found.reference, None);
+        assert!((found.time_s[0] - 1.7e9).abs() < 1e-3, "{found:?}");
+        let step_s = found.time_s[1] - found.time_s[0];
+        assert!((step_s - 1.5).abs() < 1e-3, "{found:?}");
+    }
+    // What is stated is believed, and times that begin at 0 are no dates.
+    let stated = times(&table("time_s\n1700000000000\n"), 1).unwrap();
+    assert_eq!(stated.time_s, [1.7e12]);
+    let from_zero = Given::numbers("time", &[], &[0.0, 2e11]);
+    assert_eq!(times(&from_zero, 2).unwrap().time_s, [0.0, 2e11]);
+}
+
+#[test]
 fn columns_are_found_in_any_spelling_of_their_names() {
     for (header, unit) in [
         ("Radial velocity [cm/s]", 0.01),

@@ -6,6 +6,7 @@ use crate::Error;
 use crate::detection::scan_turbulence::{turbulence_json, with_turbulence};
 use crate::io::Table;
 use crate::io::scans::{ReadScan, plane_numbers};
+use crate::progress::Observer;
 use serde::Serialize;
 use serde_json::{Value, json};
 use wakescope_estimate::Measured;
@@ -143,18 +144,29 @@ pub struct PlaneTrack {
     pub track: Track,
 }
 
-/// The tracks of scans, one for each plane that has one.
+/// The tracks of scans, one for each plane that has one. The observer is warned of scans that are in none as an earlier one of their
+/// plane has their time.
 ///
 /// # Errors
 /// What the filter refuses.
-pub fn tracks_of(scans: &[RetrievedScan]) -> Result<Vec<PlaneTrack>, Error> {
+pub fn tracks_of(
+    scans: &[RetrievedScan],
+    observer: &dyn Observer,
+) -> Result<Vec<PlaneTrack>, Error> {
     let numbers = plane_numbers(scans.iter().map(|scan| &scan.scan));
     let planes = numbers.iter().max().map_or(0, |last| last + 1);
     let mut tracks = Vec::new();
     for plane in 0..planes {
         let own: Vec<usize> = (0..scans.len()).filter(|i| numbers[*i] == plane).collect();
         let results = own.iter().map(|i| &scans[*i].result);
+        let times_s: Vec<f64> = results
+            .clone()
+            .map(|result| result.reference_time_s)
+            .collect();
         if let Some(track) = track_of(results)? {
+            if let Some(text) = left_out_text(&own, &times_s) {
+                observer.warn(&text);
+            }
             tracks.push(PlaneTrack {
                 plane,
                 azimuth_rad: scans[own[0]].scan.azimuth_rad,
@@ -166,21 +178,54 @@ pub fn tracks_of(scans: &[RetrievedScan]) -> Result<Vec<PlaneTrack>, Error> {
     Ok(tracks)
 }
 
-/// The track of the scans of one plane that have times, in the order of these; nothing of a single one, or without a wake.
+/// The places of known times in the order of these; of equal ones that of the first.
+fn in_order(times_s: &[f64]) -> Vec<usize> {
+    let mut places = Vec::with_capacity(times_s.len());
+    for (place, time_s) in times_s.iter().enumerate() {
+        if time_s.is_finite() {
+            places.push(place);
+        }
+    }
+    places.sort_by(|a, b| times_s[*a].total_cmp(&times_s[*b]));
+    places.dedup_by_key(|place| times_s[*place]);
+    places
+}
+
+/// That scans with these numbers, from 0, and times are left out of a track as others before them have their times, if any are.
+fn left_out_text(numbers: &[usize], times_s: &[f64]) -> Option<String> {
+    let kept = in_order(times_s);
+    let mut left_out = Vec::new();
+    for (place, (number, time_s)) in numbers.iter().zip(times_s).enumerate() {
+        if time_s.is_finite() && !kept.contains(&place) {
+            left_out.push(format!("scan {}", number + 1));
+        }
+    }
+    let last = left_out.pop()?;
+    Some(match &left_out[..] {
+        [] => format!(
+            "{last} has the time of an earlier scan of its plane: it is left out of the track"
+        ),
+        _ => format!(
+            "{} and {last} have the times of earlier scans of their plane: they are left out of the track",
+            left_out.join(", ")
+        ),
+    })
+}
+
+/// The track of the scans of one plane that have times, in the order of these, of equal ones the first; nothing of a single one, or
+/// without a wake.
 ///
 /// # Errors
 /// What the filter refuses.
 pub fn track_of<'r>(
     results: impl IntoIterator<Item = &'r ScanResult>,
 ) -> Result<Option<Track>, Error> {
-    let mut results: Vec<&ScanResult> = results.into_iter().collect();
-    results.retain(|result| result.reference_time_s.is_finite());
-    results.sort_by(|a, b| a.reference_time_s.total_cmp(&b.reference_time_s));
-    let increase = results
-        .windows(2)
-        .all(|pair| pair[1].reference_time_s > pair[0].reference_time_s);
+    let all: Vec<&ScanResult> = results.into_iter().collect();
+    let times_s: Vec<f64> = all.iter().map(|result| result.reference_time_s).collect();
+    let places = in_order(&times_s);
+    let results: Vec<&ScanResult> = places.into_iter().map(|place| all[place]).collect();
     let found = results.iter().any(|result| !result.vortices.is_empty());
-    if results.len() < 2 || !increase || !found {
+    if results.len() < 2 || !found {
         return Ok(None);
     }
     Ok(Some(track(&results, Track::ACCELERATION_DENSITY_M2_S3)?))
@@ -295,3 +340,87 @@ fn vortex_json(vortex: &VortexResult) -> Value {
 /// Names of the parameters of a wake in their order.
 const PARAMETER_NAMES: &str = "gamma_left_m2_s gamma_right_m2_s y_left_m z_left_m y_right_m z_right_m core_left_m core_right_m wind_m_s \
                                shear_per_s";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+    use wakescope_estimate::retrieval::Side;
+    use wakescope_estimate::vortex_fit::WakeModel;
+
+    fn known(value: f64, std: f64) -> Measured {
+        Measured { value, std }
+    }
+
+    /// A scan with a pair of 400 m^2/s that sinks by 0.3 m/s.
+    fn scan(time_s: f64) -> ScanResult {
+        let height_m = 80.0 - 0.3 * time_s;
+        let values = [
+            400.0, 400.0, 376.0, height_m, 424.0, height_m, 2.0, 2.0, 1.0, 0.0,
+        ];
+        let wake = Wake::from_array(&values);
+        let mut covariance = Array2::<f64>::zeros((10, 10));
+        for (i, std) in [8.0, 8.0, 0.6, 0.2, 0.6, 0.2].into_iter().enumerate() {
+            covariance[[i, i]] = std * std;
+        }
+        let vortices =
+            [(Side::Left, 376.0), (Side::Right, 424.0)].map(|(side, y_m)| VortexResult {
+                side,
+                time_s,
+                circulation_m2_s: known(400.0, 8.0),
+                circulation_5_15_m2_s: known(400.0, 8.0),
+                lateral_position_m: known(y_m, 0.6),
+                height_m: known(height_m, 0.2),
+                core_radius_m: None,
+            });
+        ScanResult {
+            vortices: vortices.to_vec(),
+            wake: Some(wake),
+            reference_time_s: time_s,
+            covariance,
+            lateral_wind_m_s: known(0.0, f64::NAN),
+            wind_shear_per_s: known(0.0, f64::NAN),
+            chi2_per_dof: 1.0,
+            cells_used: 2000,
+            cells_rejected: 0,
+            statistic: 1e4,
+            threshold: 22.0,
+            flags: Vec::new(),
+            tops: Vec::new(),
+            turbulence: None,
+            model: WakeModel::default(),
+        }
+    }
+
+    #[test]
+    fn scans_of_equal_times_do_not_end_a_track() {
+        let single: Vec<ScanResult> = [0.0, 10.0, 20.0].map(scan).to_vec();
+        let expected = track_of(&single).unwrap();
+        assert_eq!(expected.as_ref().map(|track| track.points.len()), Some(3));
+        let mut twice = single.clone();
+        // The later of two scans is another one, so that it would change the track.
+        twice.insert(2, scan(10.0));
+        twice[2].vortices.clear();
+        twice.push(scan(f64::NAN));
+        let found = track_of(&twice).unwrap();
+        // As texts, in which what is not known is equal, too.
+        assert_eq!(format!("{found:?}"), format!("{expected:?}"));
+        assert_eq!(track_of(&twice[1..3]).unwrap(), None);
+    }
+
+    #[test]
+    fn scans_of_equal_times_are_named() {
+        let numbers = [0, 2, 3, 5, 6];
+        assert_eq!(
+            left_out_text(&numbers, &[0.0, 1.0, f64::NAN, f64::NAN, 2.0]),
+            None
+        );
+        let one = left_out_text(&numbers, &[10.0, 1.0, 10.0, 3.0, 2.0]).unwrap();
+        assert!(one.starts_with("scan 4 has the time"), "{one}");
+        let several = left_out_text(&numbers, &[1.0, 1.0, 10.0, 1.0, 10.0]).unwrap();
+        assert!(
+            several.starts_with("scan 3, scan 6 and scan 7 have"),
+            "{several}"
+        );
+    }
+}

@@ -231,6 +231,32 @@ fn each_plane_has_its_azimuth_and_its_own_track_in_one_file_or_in_several() {
         (warned.as_str(), &summary(&table)[..]),
         ("", &expected[..5])
     );
+    // Of two turns the times tell the scans apart.
+    fs::write(folder.join("turns.csv"), csv(&all, FIRST)).unwrap();
+    let (table, warned) = retrieved(folder, &["turns.csv"]);
+    assert_eq!((warned.as_str(), summary(&table)), ("", expected));
+}
+
+/// Angles as a scanner reads them back differ from scan to scan, so that no two rows have one direction.
+#[test]
+fn scans_of_a_table_without_a_column_for_them_are_told_apart_by_their_times() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    let mut rays = Vec::new();
+    for (number, y_m) in [[400.0, 440.0], [415.0, 455.0]].into_iter().enumerate() {
+        let mut directions = up(90.0 + 0.01 * number as f64);
+        for (line, (_, elevation)) in directions.iter_mut().enumerate() {
+            *elevation += 0.02 * ((line * 7 + 3 * number) % 5) as f64;
+        }
+        let wake = pair(y_m, 45.0, 400.0, 2.0);
+        rays.extend(scan(&wake, 90.0, &directions, 20.0 * number as f64, FIRST));
+    }
+    fs::write(folder.join("two.csv"), csv(&rays, FIRST)).unwrap();
+    let (table, warned) = retrieved(folder, &["two.csv"]);
+    assert_eq!(warned, "");
+    let expected = [(400, "left"), (440, "right"), (415, "left"), (455, "right")]
+        .map(|(y_m, side)| (90, side.to_owned(), y_m));
+    assert_eq!(summary(&table), expected);
 }
 
 /// Elevations from 20 to 160 degrees, as a scanner has them that turns its azimuth at the zenith.

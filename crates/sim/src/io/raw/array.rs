@@ -22,6 +22,31 @@ pub enum Order {
     SampleMajor,
 }
 
+impl Order {
+    /// The place in a file, among its `records`, of a record in the order of lines and their pulses.
+    pub(super) fn place(self, record: usize, records: usize, pulses_per_line: usize) -> usize {
+        let pulses = pulses_per_line.max(1);
+        match self {
+            Self::PulseMajor => record % pulses * (records / pulses) + record / pulses,
+            Self::LineMajor | Self::SampleMajor => record,
+        }
+    }
+
+    /// Refuses records that have no places in this order.
+    ///
+    /// # Errors
+    /// What is needed.
+    pub(super) fn check(self, records: usize, pulses_per_line: usize) -> Result<(), String> {
+        match self == Self::PulseMajor && !records.is_multiple_of(pulses_per_line.max(1)) {
+            true => Err(format!(
+                "it has {records} records, which --order pulse-major cannot divide into lines: a multiple of scan.pulses_per_line = \
+                 {pulses_per_line} is needed"
+            )),
+            false => Ok(()),
+        }
+    }
+}
+
 /// An array \[record, sample\] of numbers in a file.
 #[derive(Debug)]
 pub(super) struct ArrayInFile {
@@ -74,16 +99,11 @@ impl ArrayInFile {
             true => records.len().max(1),
             false => 1,
         };
-        let pulses = self.pulses_per_line.max(1);
         for (first, out) in records
             .step_by(together)
             .zip(out.chunks_mut((together * count).max(1)))
         {
-            // The place in the file of a record in the order of lines and their pulses.
-            let row = match self.order {
-                Order::PulseMajor => first % pulses * (self.records / pulses) + first / pulses,
-                _ => first,
-            };
+            let row = self.order.place(first, self.records, self.pulses_per_line);
             out.copy_from_slice(&self.run((row * self.samples + samples.start) as u64, out.len())?);
         }
         Ok(out)

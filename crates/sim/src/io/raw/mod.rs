@@ -128,6 +128,9 @@ pub struct RawRecords {
     fills: Vec<f64>,
     /// The factor that the numbers of the source have had.
     packed_scale: f64,
+    /// The order of the records in the file, and the pulses of a line for it.
+    order: Order,
+    pulses_per_line: usize,
     /// The stored number of zero of both parts, which is subtracted before scaling: the middle code of a converter without sign.
     pub zero: Complex<f64>,
     /// What its numbers are multiplied with, A for signals in counts.
@@ -221,6 +224,8 @@ impl RawRecords {
                 FILL_VALUES.to_vec()
             },
             packed_scale: 1.0,
+            order: Order::default(),
+            pulses_per_line: 1,
             zero: Complex::new(0.0, 0.0),
             scale: 1.0,
             outsized: f64::INFINITY,
@@ -247,6 +252,14 @@ impl RawRecords {
     /// What the numbers of the file were multiplied with in all.
     pub fn whole_scale(&self) -> f64 {
         self.packed_scale * self.scale
+    }
+
+    /// Values that the file, or a table beside it, has for the records in the order of the file, in that in which records are read:
+    /// line by line.
+    pub(crate) fn line_by_line(&self, of_file: &[f64]) -> Vec<f64> {
+        let count = of_file.len();
+        let places = (0..count).map(|record| self.order.place(record, count, self.pulses_per_line));
+        places.map(|place| of_file[place]).collect()
     }
 
     /// An error of this file.
@@ -411,6 +424,7 @@ fn records_of_array(
     };
     let samples = samples.ok_or("it holds a single number, no records")? as usize;
     let records = lengths.iter().product::<u64>() as usize;
+    order.check(records, pulses_per_line)?;
     let is_complex = stored.is_complex;
     let are_integers = !stored.number.is_float();
     let zero = stored.number.zero();
@@ -424,6 +438,8 @@ fn records_of_array(
     };
     Ok(RawRecords {
         zero: Complex::new(zero, zero),
+        order,
+        pulses_per_line,
         ..RawRecords::new(path, array, [records, samples], is_complex, are_integers)
     })
 }
@@ -455,8 +471,11 @@ fn archive(
     let records = signals.records;
     let elevation = named_array(&arrays, &["elevation_rad", "elevation"]);
     let time = named_array(&arrays, &["time_s", "pulse_time"]);
-    signals.elevation_rad = values(path, pulses_per_line, &file, elevation, records)?;
-    signals.time_s = values(path, pulses_per_line, &file, time, records)?;
+    let elevation_rad = values(path, pulses_per_line, &file, elevation, records)?;
+    let time_s = values(path, pulses_per_line, &file, time, records)?;
+    // They lie in the file as its records do.
+    signals.elevation_rad = elevation_rad.map(|own| signals.line_by_line(&own));
+    signals.time_s = time_s.map(|own| signals.line_by_line(&own));
     Ok(signals)
 }
 
@@ -492,4 +511,39 @@ fn values(
     )?;
     let read = array.source.read(0..array.records, 0..array.samples)?;
     Ok(Some(read.into_iter().map(|value| value.re).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four records of six samples, 0 to 23, with the elevations 0.1, 0.1, 0.2, 0.2 rad.
+    fn opened(order: Order, pulses_per_line: usize) -> Result<RawRecords, Error> {
+        let format = RawFormat {
+            order,
+            ..RawFormat::default()
+        };
+        let reference = "../../tests/reference/sim/numpy.npz";
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(reference);
+        RawRecords::open(&path, &format, 6, pulses_per_line)
+    }
+
+    #[test]
+    fn angles_of_an_archive_are_those_of_its_records_in_every_order() {
+        let by_lines = opened(Order::LineMajor, 2).unwrap();
+        assert_eq!(by_lines.elevation_rad, Some(vec![0.1, 0.1, 0.2, 0.2]));
+        let mut by_pulses = opened(Order::PulseMajor, 2).unwrap();
+        assert_eq!(by_pulses.elevation_rad, Some(vec![0.1, 0.2, 0.1, 0.2]));
+        let first_samples = by_pulses.read_samples(0..4, 0..1).unwrap();
+        let first_samples: Vec<f64> = first_samples.iter().map(|sample| sample.re).collect();
+        assert_eq!(first_samples, [0.0, 12.0, 6.0, 18.0]);
+    }
+
+    #[test]
+    fn records_that_are_no_whole_lines_have_no_order_of_pulses() {
+        let refused = opened(Order::PulseMajor, 3).unwrap_err().to_string();
+        assert!(refused.contains("4 records"), "{refused}");
+        assert!(refused.contains("scan.pulses_per_line = 3"), "{refused}");
+        assert!(opened(Order::LineMajor, 3).is_ok());
+    }
 }

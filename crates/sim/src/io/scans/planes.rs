@@ -199,6 +199,49 @@ pub(super) fn in_any_order(rays: Vec<RayRow>) -> Result<Split, String> {
     split(rays, by_plane)
 }
 
+/// The scans of rays in any order: those of the order of their times where these show several that cover the same elevations of a plane, else one
+/// for each plane.
+///
+/// # Errors
+/// As [`in_any_order`].
+pub(super) fn in_time_or_any_order(rays: Vec<RayRow>) -> Result<Split, String> {
+    if rays.iter().all(|ray| ray.time_s.is_finite()) {
+        let mut in_time = rays.clone();
+        in_time.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        if let Ok(found) = in_order(in_time)
+            && cover_elevations_again(&found.0)
+        {
+            return Ok(found);
+        }
+    }
+    in_any_order(rays)
+}
+
+/// Whether two scans of one plane have more than half of the elevations of one of them in common. Single wrong times cut a scan into parts that
+/// have not.
+fn cover_elevations_again(scans: &[PlaneScan]) -> bool {
+    let mut spans = Vec::with_capacity(scans.len());
+    for scan in scans {
+        let elevations = scan.rays.iter().map(|ray| ray.elevation_rad);
+        let low = elevations.clone().fold(f64::INFINITY, f64::min);
+        let high = elevations.fold(f64::NEG_INFINITY, f64::max);
+        spans.push((scan.azimuth_rad, low, high));
+    }
+    for (number, (azimuth_rad, low, high)) in spans.iter().enumerate() {
+        for (other_rad, other_low, other_high) in &spans[..number] {
+            let apart_rad = azimuth_rad
+                .zip(*other_rad)
+                .map_or(0.0, |(a, b)| (a - b).abs());
+            let common = high.min(*other_high) - low.max(*other_low);
+            let shorter = (high - low).min(other_high - other_low);
+            if apart_rad < OFF_PLANE_RAD && shorter > 0.0 && common > 0.5 * shorter {
+                return true;
+            }
+        }
+    }
+    false
+}
+
 /// The scans that `find` makes of the possible rays.
 fn split(
     mut rays: Vec<RayRow>,

@@ -59,10 +59,15 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
         ));
     }
     for (sweep, velocities) in sweeps {
-        let (rays, range_m) = grid(&velocities)?;
+        let (rays, range_m) = match grid(&velocities, false) {
+            Err(_) if velocities.iter().all(|row| row.time_s.is_finite()) => {
+                grid(&velocities, true)?
+            }
+            first => first?,
+        };
         let what = format!("sweep {sweep}");
         let (scans, skipped) =
-            planes::in_any_order(rays).map_err(|reason| format!("{what}: {reason}"))?;
+            planes::in_time_or_any_order(rays).map_err(|reason| format!("{what}: {reason}"))?;
         let skipped = skipped.iter().map(|text| format!("{what}: {text}"));
         found.skipped.extend(skipped);
         for scan in scans {
@@ -355,17 +360,19 @@ fn column_names(table: &TextTable) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
-/// The rays of one sweep on the ranges of all, in the order in which they first come.
-fn grid(rows: &[TableVelocity]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
+/// The rays of one sweep on the ranges of all, in the order in which they first come. Rows of one direction are one ray, or with
+/// `at_one_time` those of one direction and time.
+fn grid(rows: &[TableVelocity], at_one_time: bool) -> Result<(Vec<RayRow>, Vec<f64>), String> {
     let range_m = axis(rows.iter().map(|row| row.range_m).collect());
     let elevation_rad = axis(rows.iter().map(|row| row.elevation_rad).collect());
     let gates = range_m.len();
-    let mut lines: BTreeMap<(usize, u64), usize> = BTreeMap::new();
+    let mut lines: BTreeMap<(usize, u64, u64), usize> = BTreeMap::new();
     let mut line_of_row = Vec::with_capacity(rows.len());
     for row in rows {
         let elevation = nearest(&elevation_rad, row.elevation_rad);
         let next = lines.len();
-        let line = lines.entry((elevation, row.azimuth_rad.to_bits()));
+        let time = if at_one_time { row.time_s } else { 0.0 };
+        let line = lines.entry((elevation, row.azimuth_rad.to_bits(), time.to_bits()));
         line_of_row.push(*line.or_insert(next));
     }
     let lines = lines.len();

@@ -110,7 +110,7 @@ pub(super) fn scans(
     let count = records.records;
     let per_line = plan.scene().scan.pulses_per_line;
     let (elevation_rad, time_s) = match table {
-        Some(table) => interpolate(table, count, per_line)?,
+        Some(table) => interpolate(table, records, per_line)?,
         None => match &records.elevation_rad {
             Some(elevation_rad) => (elevation_rad.clone(), records.time_s.clone()),
             None => (of_scene(plan, records)?, records.time_s.clone()),
@@ -218,15 +218,18 @@ pub(super) fn scans(
     Ok(found)
 }
 
-/// Angles and times of all records from those of records or lines.
+/// Angles and times of all records from those of records, in the order of the file, or of lines.
 fn interpolate(
     table: &RayTable,
-    count: usize,
+    records: &RawRecords,
     per_line: usize,
 ) -> Result<(Vec<f64>, Option<Vec<f64>>), Error> {
+    let count = records.records;
     let rows = table.elevation_rad.len();
     if rows == count {
-        return Ok((table.elevation_rad.clone(), table.time_s.clone()));
+        let elevation_rad = records.line_by_line(&table.elevation_rad);
+        let time_s = table.time_s.as_deref();
+        return Ok((elevation_rad, time_s.map(|own| records.line_by_line(own))));
     }
     if rows * per_line != count {
         let reason = format!(
@@ -264,4 +267,38 @@ fn of_scene(plan: &Plan, records: &RawRecords) -> Result<Vec<f64>, Error> {
         .iter()
         .flat_map(|angle| std::iter::repeat_n(*angle, per_line));
     Ok(scan.cycle().take(count).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::raw::{Order, RawFormat};
+
+    #[test]
+    fn rows_of_records_are_in_the_order_of_the_file_and_rows_of_lines_are_not() {
+        let reference = "../../tests/reference/sim/numpy.npz";
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(reference);
+        let of_rows = |order: Order, rows: usize| {
+            let format = RawFormat {
+                order,
+                ..RawFormat::default()
+            };
+            let records = RawRecords::open(&path, &format, 6, 2).unwrap();
+            let table = RayTable {
+                path: path.clone(),
+                elevation_rad: (0..rows).map(|row| 0.1 * row as f64).collect(),
+                time_s: Some((0..rows).map(|row| row as f64).collect()),
+            };
+            interpolate(&table, &records, 2).unwrap()
+        };
+        let by_lines = of_rows(Order::LineMajor, 4);
+        assert_eq!(by_lines.1, Some(vec![0.0, 1.0, 2.0, 3.0]));
+        let by_pulses = of_rows(Order::PulseMajor, 4);
+        assert_eq!(by_pulses.0, [0.0, 0.2, 0.1, 0.1 * 3.0]);
+        assert_eq!(by_pulses.1, Some(vec![0.0, 2.0, 1.0, 3.0]));
+        for order in [Order::LineMajor, Order::PulseMajor] {
+            let of_lines = of_rows(order, 2);
+            assert_eq!(of_lines.1, Some(vec![0.0, 0.0, 1.0, 1.0]));
+        }
+    }
 }

@@ -30,6 +30,9 @@ struct Placed {
 /// Steps of a periodic direction may differ by this fraction: axes of turbulence boxes are often 32-bit numbers.
 const EQUAL_STEPS: f64 = 1e-3;
 
+/// A node repeats the first one if it is one period further, to this fraction of a step.
+const SAME_PLACE: f64 = 0.01;
+
 /// Points that are turned at once.
 const BATCH: usize = 256;
 
@@ -89,41 +92,11 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
         values: c.values.into_iter().map(|v| v * unit).collect(),
     };
     let (components, stated_m) = read(field, &flow.names)?;
-    let components = components.map(|c| scaled(c, flow.velocity_unit_m_s));
+    let mut components = components.map(|c| scaled(c, flow.velocity_unit_m_s));
+    let stated_m = stated_m.map(|stated| stated.map(|period_m| period_m * flow.length_unit_m));
     let refuse = |reason: String| Error::Input {
         path: field.path.clone(),
         reason,
-    };
-    // The period that the file states, or of evenly spaced nodes; faces and centres have the same.
-    let along = |direction: usize, periodic: bool| -> Result<Edges, Error> {
-        let nodes_m = &components[direction].nodes_m[direction];
-        let (Some(first), Some(second), Some(last)) =
-            (nodes_m.first(), nodes_m.get(1), nodes_m.last())
-        else {
-            return Err(refuse("a coordinate without values".into()));
-        };
-        if !periodic {
-            return Ok(Edges::Bounded {
-                low: Side::Open,
-                high: Side::Open,
-            });
-        }
-        if let Some(period_m) = stated_m[direction] {
-            return Ok(Edges::Periodic {
-                period_m: period_m * flow.length_unit_m,
-            });
-        }
-        let step_m = second - first;
-        if nodes_m
-            .windows(2)
-            .any(|pair| (pair[1] - pair[0] - step_m).abs() > EQUAL_STEPS * step_m)
-        {
-            let needed = "a periodic direction needs nodes at equal distances, or an attribute edges = \"periodic LENGTH\"";
-            return Err(refuse(needed.into()));
-        }
-        Ok(Edges::Periodic {
-            period_m: last - first + step_m,
-        })
     };
     let low = match flow.ground {
         FieldGround::Open => Side::Open,
@@ -133,15 +106,91 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
         },
         FieldGround::Slip => Side::SlipWall { position_m: 0.0 },
     };
-    let edges = [
-        along(0, flow.periodic_x)?,
-        along(1, flow.periodic_y)?,
-        Edges::Bounded {
-            low,
-            high: Side::Open,
-        },
-    ];
+    let is_periodic = [flow.periodic_x, flow.periodic_y];
+    let [along_x, along_y] =
+        horizontal_edges(&mut components, is_periodic, stated_m).map_err(refuse)?;
+    let along_z = Edges::Bounded {
+        low,
+        high: Side::Open,
+    };
+    let edges = [along_x, along_y, along_z];
     VolumeSnapshot::new(&components, edges).map_err(|e| refuse(e.to_string()))
+}
+
+/// The ends of the directions x and y, with the periods that a file states, if it does; last nodes that repeat the first ones of a
+/// period are taken out of the components.
+fn horizontal_edges(
+    components: &mut [VolumeComponent; 3],
+    is_periodic: [bool; 2],
+    stated_m: [Option<f64>; 2],
+) -> Result<[Edges; 2], String> {
+    let mut edges = [Edges::Bounded {
+        low: Side::Open,
+        high: Side::Open,
+    }; 2];
+    for (direction, edges) in edges.iter_mut().enumerate() {
+        if !is_periodic[direction] {
+            continue;
+        }
+        let period_m = match stated_m[direction] {
+            Some(stated_m) => stated_m,
+            None => spaced_period_m(components, direction)?,
+        };
+        for component in components.iter_mut() {
+            take_out_repeated(component, direction, period_m);
+        }
+        *edges = Edges::Periodic { period_m };
+    }
+    Ok(edges)
+}
+
+/// The period of evenly spaced nodes along a direction \[m\]: of the component with the fewest of them. Faces have one node more than
+/// centres in files of WRF and CM1, where the last face is the first one again.
+fn spaced_period_m(components: &[VolumeComponent; 3], direction: usize) -> Result<f64, String> {
+    let mut nodes_m = &components[direction].nodes_m[direction];
+    for component in components {
+        let own_m = &component.nodes_m[direction];
+        if own_m.len() < nodes_m.len() {
+            nodes_m = own_m;
+        }
+    }
+    let &[first_m, second_m, .., last_m] = &nodes_m[..] else {
+        let count = nodes_m.len();
+        return Err(format!(
+            "a periodic direction has {count} nodes: at least 4 are needed"
+        ));
+    };
+    let step_m = second_m - first_m;
+    if nodes_m
+        .windows(2)
+        .any(|pair| (pair[1] - pair[0] - step_m).abs() > EQUAL_STEPS * step_m)
+    {
+        let needed = "a periodic direction needs nodes at equal distances, or an attribute edges = \"periodic LENGTH\"";
+        return Err(needed.into());
+    }
+    Ok(last_m - first_m + step_m)
+}
+
+/// Takes the last node of a component along a direction out, with its values, where it is the first one again.
+fn take_out_repeated(component: &mut VolumeComponent, direction: usize, period_m: f64) {
+    let nodes_m = &component.nodes_m[direction];
+    let count = nodes_m.len();
+    let (Some(first_m), Some(last_m)) = (nodes_m.first(), nodes_m.last()) else {
+        return;
+    };
+    let beyond_m = (last_m - first_m - period_m).abs();
+    if beyond_m > SAME_PLACE * period_m / count as f64 {
+        return;
+    }
+    let lengths = component.nodes_m[..direction].iter().map(Vec::len);
+    let inner: usize = lengths.product();
+    let mut at = 0;
+    component.values.retain(|_| {
+        let place = at / inner % count;
+        at += 1;
+        place + 1 != count
+    });
+    component.nodes_m[direction].pop();
 }
 
 /// Reads fields: their times, and once each for its gradient; the rest when it is needed.
@@ -248,4 +297,101 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
         },
         ..found
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// Length after which the wave of the tests repeats itself, m.
+    const PERIOD_M: f64 = 80.0;
+
+    fn wave(x_m: f64) -> f64 {
+        (TAU * x_m / PERIOD_M).sin()
+    }
+
+    /// Nodes 10 m apart.
+    fn nodes_m(first_m: f64, count: usize) -> Vec<f64> {
+        (0..count).map(|i| first_m + 10.0 * i as f64).collect()
+    }
+
+    /// A component with these nodes along x and y whose values are a wave along one of them.
+    fn component(xs_m: Vec<f64>, ys_m: Vec<f64>, direction: usize) -> VolumeComponent {
+        let zs_m = nodes_m(5.0, 4);
+        let mut values = Vec::new();
+        for _ in &zs_m {
+            for &y_m in &ys_m {
+                values.extend(xs_m.iter().map(|&x_m| wave([x_m, y_m][direction])));
+            }
+        }
+        VolumeComponent {
+            nodes_m: [xs_m, ys_m, zs_m],
+            values,
+        }
+    }
+
+    /// The components u, v, w of a staggered mesh of 8 x 8 cells with 9 faces, the last of which are the first ones again.
+    fn staggered(direction: usize) -> [VolumeComponent; 3] {
+        [
+            component(nodes_m(0.0, 9), nodes_m(5.0, 8), direction),
+            component(nodes_m(5.0, 8), nodes_m(0.0, 9), direction),
+            component(nodes_m(5.0, 8), nodes_m(5.0, 8), direction),
+        ]
+    }
+
+    #[test]
+    fn the_last_faces_of_a_periodic_direction_are_the_first_ones_again() {
+        for direction in [0, 1] {
+            for stated_m in [None, Some(PERIOD_M)] {
+                let mut components = staggered(direction);
+                let edges = horizontal_edges(&mut components, [true; 2], [stated_m; 2]).unwrap();
+                let period = Edges::Periodic { period_m: PERIOD_M };
+                assert_eq!(edges, [period; 2]);
+                let along_z = Edges::Bounded {
+                    low: Side::Open,
+                    high: Side::Open,
+                };
+                let edges = [period, period, along_z];
+                let wind = VolumeSnapshot::new(&components, edges).unwrap();
+                // Nodes of faces, those at both ends of the last cell and of the third period among them.
+                for place_m in [0.0, 70.0, 80.0, 250.0] {
+                    let mut point_m = [35.0, 35.0, 20.0];
+                    point_m[direction] = place_m;
+                    let mut found_m_s = [[0.0; 3]];
+                    wind.velocity_into(&[point_m], 0.0, &mut found_m_s).unwrap();
+                    let found = found_m_s[0][direction];
+                    let expected = wave(place_m);
+                    assert!(
+                        (found - expected).abs() < 1e-9,
+                        "{place_m} m: {found} for {expected}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nodes_within_one_period_all_stay() {
+        let mut components = [(); 3].map(|()| component(nodes_m(5.0, 8), nodes_m(5.0, 8), 0));
+        let before = components.clone();
+        let edges = horizontal_edges(&mut components, [true, false], [None; 2]).unwrap();
+        assert_eq!(edges[0], Edges::Periodic { period_m: PERIOD_M });
+        assert_eq!(components, before);
+        let mut bounded = staggered(0);
+        let edges = horizontal_edges(&mut bounded, [false; 2], [None; 2]).unwrap();
+        assert!(matches!(edges[0], Edges::Bounded { .. }));
+        assert_eq!(bounded, staggered(0));
+    }
+
+    #[test]
+    fn uneven_nodes_need_a_stated_period() {
+        let mut uneven = staggered(0);
+        for component in &mut uneven {
+            component.nodes_m[0][1] += 1.0;
+        }
+        let refused = horizontal_edges(&mut uneven, [true, false], [None; 2]).unwrap_err();
+        assert!(refused.contains("equal distances"), "{refused}");
+        assert!(horizontal_edges(&mut uneven, [true, false], [Some(PERIOD_M); 2]).is_ok());
+    }
 }
