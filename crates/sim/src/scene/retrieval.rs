@@ -1,6 +1,6 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
-use super::{NoiseModel, Pattern, Scan, Scene, Weighting};
+use super::{Flow, NoiseModel, Pattern, Scan, Scene, Weighting};
 use crate::beams::direction::sin_cos_of_turn;
 use crate::keys::{Checker, Is, keys};
 use wakescope_estimate::vortex_fit::{LiftSlope, Secondary};
@@ -112,6 +112,9 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let allowed =
         "a flow with vortices: flow.kind = \"vortex_pair\" with a circulation, or \"simulated\"";
     c.require(has_vortices, "retrieval", "a table", allowed);
+    let allowed = "absent with vortices among added_flows: the truth of fits is that of the pair of flow alone";
+    let has_one_pair = !scene.added_flows.iter().any(Flow::has_vortices);
+    c.require(has_one_pair, "retrieval", "a table", allowed);
     let allowed = "another method where detector.noise = \"none\" or the pulse is sampled: their signals have no likelihood here";
     for method in [RetrievalMethod::Signals, RetrievalMethod::Envelope] {
         let is_likely = scene.pulse.is_gaussian() && scene.detector.noise != NoiseModel::None;
@@ -219,6 +222,10 @@ mod tests {
                 "retrieval.follower.span_m",
             ),
             ("[retrieval]\n[flow]\nkind = \"calm\"\n", "retrieval"),
+            (
+                "[retrieval]\n[[added_flows]]\nkind = \"vortex_pair\"\n",
+                "retrieval",
+            ),
             (
                 "[retrieval]\n[scan.pattern]\nkind = \"stare\"\n",
                 "retrieval",
