@@ -1,9 +1,9 @@
 //! Cn2 along the line of sight, constant or a profile over height, and its integrals.
 //!
-//! Check: the profile integrates exactly on straight pieces, however thin.
+//! Check: the profile integrates exactly on straight pieces, however thin, and is constant beyond its ends.
 
 use crate::Error;
-use crate::error::{finite, not_negative, within};
+use crate::error::{finite, not_negative};
 use crate::quadrature::{GaussLegendre, lagrange};
 
 /// Cn2 along the line of sight.
@@ -16,7 +16,8 @@ pub enum Cn2Path {
         /// Cn2 \[m^(-2/3)\], above 0.
         cn2_m_m23: f64,
     },
-    /// A profile over height along a slanted line; linear between the points.
+    /// A profile over height along a slanted line; linear between the points, constant below the
+    /// lowest and above the highest.
     Heights {
         /// Heights above ground \[m\], increasing strictly.
         height_m: Vec<f64>,
@@ -33,7 +34,7 @@ impl Cn2Path {
     /// Cn2 \[m^(-2/3)\] at distance `range_m` from the telescope.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a height outside the profile.
+    /// [`Error::OutOfRange`] for a range whose height is not finite.
     pub fn at(&self, range_m: f64) -> Result<f64, Error> {
         match self {
             Self::None => Ok(0.0),
@@ -44,20 +45,11 @@ impl Cn2Path {
                 telescope_height_m,
                 elevation_rad,
             } => {
-                let h = telescope_height_m + range_m * elevation_rad.sin();
                 let last = height_m.len() - 1;
-                // A horizontal path along the lowest or highest point must not fail by a
-                // rounding error.
-                let slack = 1e-9 * (height_m[last] - height_m[0]);
-                let inside = h >= height_m[0] - slack && h <= height_m[last] + slack;
-                within(
-                    "height_m",
-                    h,
-                    inside,
-                    "within the heights of the Cn2 profile along the whole path",
-                )?;
+                let height = telescope_height_m + range_m * elevation_rad.sin();
+                let h = finite("height_m", height)?.clamp(height_m[0], height_m[last]);
                 let i = height_m.partition_point(|&v| v <= h).clamp(1, last) - 1;
-                let t = ((h - height_m[i]) / (height_m[i + 1] - height_m[i])).clamp(0.0, 1.0);
+                let t = (h - height_m[i]) / (height_m[i + 1] - height_m[i]);
                 Ok(cn2_m_m23[i] * (1.0 - t) + cn2_m_m23[i + 1] * t)
             }
         }
@@ -269,7 +261,40 @@ mod tests {
         assert!((path.at(80.0).unwrap() / 1.5e-13 - 1.0).abs() < 1e-12);
         assert!((path.mean(0.0, 160.0).unwrap() / 1.5e-13 - 1.0).abs() < 0.1);
         assert!((path.mean(20.0, 100.0).unwrap() / 1.6e-13 - 1.0).abs() < 1e-12);
-        assert_eq!(crate::error::refused(path.at(2000.0)), "height_m");
+        assert_eq!(crate::error::refused(path.at(f64::INFINITY)), "height_m");
+    }
+
+    /// From 20 m above ground through a profile from 10 m to 40 m.
+    fn from_within(elevation_deg: f64) -> Cn2Path {
+        Cn2Path::Heights {
+            height_m: vec![10.0, 20.0, 40.0],
+            cn2_m_m23: vec![3e-13, 2e-13, 1e-13],
+            telescope_height_m: 20.0,
+            elevation_rad: elevation_deg.to_radians(),
+        }
+        .validated()
+        .unwrap()
+    }
+
+    #[test]
+    fn a_profile_is_constant_beyond_its_ends() {
+        let down = from_within(-30.0);
+        let up = from_within(30.0);
+        for (path, range_m, expected) in [
+            (&down, 20.0, 3e-13),
+            (&down, 100.0, 3e-13),
+            (&up, 40.0, 1e-13),
+            (&up, 100.0, 1e-13),
+        ] {
+            let found = path.at(range_m).unwrap();
+            assert!((found / expected - 1.0).abs() < 1e-12, "{range_m}: {found}");
+        }
+        // To 10 m above ground 2.5e-13 over 20 m, then 3e-13 over 80 m.
+        let exact = 20.0 * 2.5e-13 + 80.0 * 3e-13;
+        let mean = down.mean(0.0, 100.0).unwrap();
+        assert!((100.0 * mean / exact - 1.0).abs() < 1e-12, "{mean}");
+        let sum: f64 = down.quadrature(100.0).unwrap().iter().map(|(_, w)| w).sum();
+        assert!((sum / exact - 1.0).abs() < 1e-9, "{sum}");
     }
 
     #[test]

@@ -168,6 +168,45 @@ fn converted_noise_has_the_clipping_and_rounding_of_the_closed_forms() {
     assert!(coarse.clipping_noise() < 1e-4 * coarse.rounding());
 }
 
+#[test]
+fn noise_in_few_codes_has_the_gain_and_the_variance_of_the_sums_over_them() {
+    let receiver = real(NoiseModel::White);
+    let input_over_noise = (125.0_f64 / 50.0).sqrt();
+    let plain = noise(receiver, 100);
+    let n = plain.len() as f64;
+    let power_a2 = plain.iter().map(|x| x * x).sum::<f64>() / n;
+    for (bits, k) in [(2, 2.0), (2, 8.0), (3, 1.0), (3, 2.0)] {
+        let full_scale_over_noise = k * input_over_noise;
+        let converter = Converter {
+            bits,
+            full_scale_over_noise,
+            bandwidth_hz: 50e6,
+            sample_rate_hz: 250e6,
+            input_over_noise,
+        };
+        let full_scale_a = full_scale_over_noise * receiver.noise_variance_a2().sqrt();
+        let mut samples = plain.clone();
+        Digitiser::new(bits, full_scale_a)
+            .unwrap()
+            .digitise(&mut samples)
+            .unwrap();
+        let mean_a = samples.iter().sum::<f64>() / n;
+        let variance = samples.iter().map(|y| (y - mean_a).powi(2)).sum::<f64>() / n / power_a2;
+        let gain = plain.iter().zip(&samples).map(|(x, y)| x * y).sum::<f64>() / n / power_a2;
+        let clipping = converter.clipping();
+        // Four and more standard deviations of the samples at hand; symmetric clipping beside rounding is 7 to 220 % off.
+        let counted =
+            clipping.gain.powi(2) * (1.0 + converter.rounding() + converter.clipping_noise());
+        for (found, expected) in [
+            (variance, clipping.variance),
+            (variance, counted),
+            (gain, clipping.gain),
+        ] {
+            assert_relative_eq!(found, expected, max_relative = 0.03);
+        }
+    }
+}
+
 /// A flat pulse of 1.2 us about time 0.
 fn flat() -> Pulse {
     let times: Vec<f64> = (0..=64).map(|i| (f64::from(i) - 32.0) * 20e-9).collect();

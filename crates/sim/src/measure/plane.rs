@@ -1,4 +1,6 @@
 //! The wind on a cross-plane around the scan, for the files.
+//!
+//! Check: it is where the lidar is.
 
 use crate::Error;
 use crate::interpolation::linspace;
@@ -35,7 +37,7 @@ pub(crate) fn planned(plan: &Plan) -> PlannedStage {
     )
 }
 
-/// The wind at the start of the scan, over the ground that the scan covers.
+/// The wind at the start of the scan, over the ground that the scan covers: across the flight through the place of the lidar.
 ///
 /// # Errors
 /// What the wind refuses; a checked scene gives none.
@@ -44,14 +46,16 @@ pub(crate) fn cross_plane(plan: &Plan) -> Result<CrossPlanes, Error> {
     let top_rad = scene.scan.elevation_max_rad.max(0.0);
     let bottom_rad = scene.scan.elevation_min_rad.abs().max(top_rad.abs());
     let far_m = scene.scan.range_max_m;
-    let low_y_m = scene.scan.range_min_m * bottom_rad.cos();
-    let high_y_m = far_m;
+    let x_m = scene.scan.lidar.x_m;
+    let lidar_y_m = scene.scan.lidar.y_m;
+    let low_y_m = lidar_y_m + scene.scan.range_min_m * bottom_rad.cos();
+    let high_y_m = lidar_y_m + far_m;
     let top_m = (scene.scan.lidar_height_m + far_m * top_rad.sin()).max(0.1 * far_m);
     let y_m = linspace(low_y_m, high_y_m, POINTS[0]);
     let z_m = linspace(0.0, top_m, POINTS[1]);
     let points_m: Vec<[f64; 3]> = z_m
         .iter()
-        .flat_map(|&z| y_m.iter().map(move |&y| [0.0, y, z]))
+        .flat_map(|&z| y_m.iter().map(move |&y| [x_m, y, z]))
         .collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
     let time_s = plan.wind.start_s;
@@ -74,4 +78,26 @@ pub(crate) fn cross_plane(plan: &Plan) -> Result<CrossPlanes, Error> {
         y_edges: OPEN_EDGES,
         z_edges: OPEN_EDGES,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneFile;
+    use std::path::Path;
+
+    #[test]
+    fn the_plane_is_where_the_lidar_is() {
+        // Nothing is before the aircraft, where x = 0 is.
+        let text = "[flow]\nmotion = \"inviscid\"\naircraft = { speed_m_s = 70.0, x_m = -300.0 }\n\
+            [scan.lidar]\nx_m = -350.0\ny_m = -25.0\n";
+        let file = SceneFile::parse(text, Path::new("s.toml")).unwrap();
+        let plan = Plan::new(file, Target::Run).unwrap();
+        let planes = cross_plane(&plan).unwrap();
+        let low_y_m = 280.0 * 0.2304_f64.cos() - 25.0;
+        assert!((planes.y_m[0] - low_y_m).abs() < 1e-9, "{}", planes.y_m[0]);
+        let high_y_m = planes.y_m[POINTS[0] - 1];
+        assert!((high_y_m - 495.0).abs() < 1e-9, "{high_y_m}");
+        assert!(planes.v_m_s.iter().any(|v_m_s| *v_m_s != 0.0));
+    }
 }

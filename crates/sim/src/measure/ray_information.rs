@@ -75,14 +75,47 @@ impl<'a> RayInformation<'a> {
         }
         let snr = |samples: f64| {
             // The samples of a window are centred half a sample before its range; the pulse lights layers before and behind each.
-            let at_m = range_m + (samples - 0.5) * g.sample_spacing_m;
-            let mut snr = [0.0];
-            let seen =
-                self.by_pulse
-                    .apply_into(self.layer_m[0], &self.layer_snr, &[at_m], &mut snr);
-            seen.map_or(f64::NAN, |()| snr[0].clamp(0.0, *SNR.end()))
+            self.of_sample(range_m + (samples - 0.5) * g.sample_spacing_m)
         };
         Ok(self.model.information(&scene.gates()?, count, snr)?)
+    }
+
+    /// Signal-to-noise ratio of a sample. Rows of windows at the ends of the record go on beyond it, where layers are missing: those
+    /// samples have the ratio of the nearest one for which it is known.
+    fn of_sample(&self, at_m: f64) -> f64 {
+        let snr = self.seen_by_pulse(at_m);
+        if !snr.is_nan() {
+            return snr;
+        }
+        let g = &self.plan.geometry;
+        let spacing_m = g.sample_spacing_m;
+        let last_m = g.first_sample_m + (g.samples - 1) as f64 * spacing_m;
+        let end_m = at_m.clamp(g.first_sample_m, last_m);
+        let step_m = spacing_m.copysign(at_m - end_m);
+        let mut nearest = self.seen_by_pulse(end_m);
+        // Samples beyond the end of the record: up to one it is known, from another one it is not.
+        let mut known = 0;
+        let mut unknown = ((at_m - end_m).abs() / spacing_m).ceil() as usize;
+        while unknown > known + 1 {
+            let middle = (known + unknown) / 2;
+            let snr = self.seen_by_pulse(end_m + middle as f64 * step_m);
+            if snr.is_nan() {
+                unknown = middle;
+            } else {
+                known = middle;
+                nearest = snr;
+            }
+        }
+        nearest
+    }
+
+    /// Signal-to-noise ratio of a sample, the mean over what the pulse lights; NaN where more than half of that is not known.
+    fn seen_by_pulse(&self, at_m: f64) -> f64 {
+        let mut snr = [0.0];
+        let seen = self
+            .by_pulse
+            .apply_into(self.layer_m[0], &self.layer_snr, &[at_m], &mut snr);
+        seen.map_or(f64::NAN, |()| snr[0].clamp(0.0, *SNR.end()))
     }
 
     /// The same where all samples have one signal-to-noise ratio.
@@ -137,5 +170,35 @@ mod tests {
             assert!((found / right - 1.0).abs() < 1e-5, "{found} {right}");
             assert!(right > 1.15 * of_air(range_m), "{right}");
         }
+    }
+    #[test]
+    fn rows_of_windows_go_on_beyond_the_record_with_the_ratio_of_its_ends() {
+        let text = "[pulse.shape]\nduration_s = 50e-9\n";
+        let file = SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap();
+        let plan = Plan::new(file, Target::Map).unwrap();
+        let g = &plan.geometry;
+        let same: Vec<(f64, f64)> = g.layer_range_m().map(|range_m| (range_m, 3.0)).collect();
+        let rays = RayInformation::new(&plan, &same).unwrap();
+        // 75 windows to either side, 45 m; the layers reach some 17 m beyond the record.
+        let expected = rays.of_snr(3.0, 150).unwrap();
+        for range_m in [g.gate_range_m[0], g.gate_range_m[g.gate_range_m.len() - 1]] {
+            let found = rays.at(range_m, 150).unwrap();
+            assert_eq!(found.len(), expected.len());
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+            }
+        }
+        let rising: Vec<(f64, f64)> = g
+            .layer_range_m()
+            .map(|range_m| (range_m, range_m / 100.0))
+            .collect();
+        let rays = RayInformation::new(&plan, &rising).unwrap();
+        let before = rays.of_sample(-50.0);
+        let first_layer = g.first_layer_range_m / 100.0;
+        let first_sample = g.first_sample_m / 100.0;
+        assert!(
+            before > first_layer && before < first_sample,
+            "{first_layer} {before} {first_sample}"
+        );
     }
 }

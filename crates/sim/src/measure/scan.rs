@@ -411,7 +411,8 @@ fn layer_returns(optics: &LineOptics<'_>) -> Result<Vec<f64>, Error> {
         .collect()
 }
 
-/// The air from which the pulse before comes back at the same time, c/(2 PRF) farther away, at the ranges of the lines.
+/// The air from which the pulse before comes back at the same time, c/(2 PRF) farther away, at the ranges of the lines. Nothing comes
+/// from below the ground, and nothing is seen at ranges from which the receiver is blind.
 fn previous_air(
     plan: &Plan,
     wind: &SceneWind,
@@ -434,20 +435,30 @@ fn previous_air(
     for instrument in plan.instruments() {
         let efficiency = efficiency_by_theory(instrument, &ranges_m)?;
         let mut weight_per_m = Vec::with_capacity(ranges_m.len());
-        for (range_m, eta) in ranges_m.iter().zip(&efficiency.mean) {
-            weight_per_m.push(instrument.return_per_m(*range_m)? * eta);
+        let far = ranges_m.iter().zip(&efficiency.mean);
+        for (own_range_m, (far_m, eta)) in geometry.layer_range_m().zip(far) {
+            let is_blind = own_range_m < instrument.blind_range_m;
+            let seen = if is_blind { 0.0 } else { *eta };
+            weight_per_m.push(instrument.return_per_m(*far_m)? * seen);
         }
         weights_per_m.push(weight_per_m);
     }
     let far = |(i, line): (usize, &LineOfSight)| {
-        let mut velocity_m_s = known_velocity_m_s(wind, &geometry.schedule.middle(i), &ranges_m)?.1;
+        let middle = geometry.schedule.middle(i);
+        let (points_m, mut velocity_m_s) = known_velocity_m_s(wind, &middle, &ranges_m)?;
         velocity_m_s
             .iter_mut()
             .filter(|v| v.is_nan())
             .for_each(|v| *v = elsewhere_m_s);
+        let mut weight_per_m = weights_per_m[plan.air_of_line(i)].clone();
+        for (weight_per_m, point_m) in weight_per_m.iter_mut().zip(&points_m) {
+            if point_m[2] < 0.0 {
+                *weight_per_m = 0.0;
+            }
+        }
         Ok(LineOfSight {
             radial_velocity_m_s: velocity_m_s,
-            weight_per_m: weights_per_m[plan.air_of_line(i)].clone(),
+            weight_per_m,
             ..line.clone()
         })
     };
@@ -486,4 +497,36 @@ fn drawn_efficiency(
         all.push(of_layers);
     }
     Ok(Some(all))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Target;
+    use crate::scene::SceneFile;
+    use std::path::Path;
+
+    #[test]
+    fn the_pulse_before_has_no_echo_from_below_the_ground_and_none_at_blind_ranges() {
+        // Pulses 1.5 km apart: one line is then 100 m and more below the ground, one above it.
+        let text = "flow = { kind = \"uniform\", lateral_m_s = 4.0, vertical_m_s = 0.0 }\n\
+            [laser]\npulse_repetition_hz = 100e3\n[telescope]\nblind_range_m = 350.0\n\
+            [scan]\nlidar_height_m = 60.0\nelevation_min_rad = -0.1\nelevation_max_rad = 0.1\nelevation_step_rad = 0.2\n\
+            range_min_m = 300.0\nrange_max_m = 400.0\nsecond_trip = {}\n";
+        let file = SceneFile::parse(text, Path::new("s.toml")).unwrap();
+        let plan = Plan::new(file, Target::Signal).unwrap();
+        let geometry = &plan.geometry;
+        assert_eq!(geometry.schedule.lines.len(), 2);
+        let air = line_of_sight(
+            &vec![1.0; geometry.layers],
+            vec![0.0; geometry.layers],
+            geometry,
+        );
+        let lines = vec![air; 2];
+        let previous = previous_air(&plan, &plan.wind, &lines).unwrap().unwrap();
+        assert!(previous[0].weight_per_m.iter().all(|weight| *weight == 0.0));
+        for (range_m, weight) in geometry.layer_range_m().zip(&previous[1].weight_per_m) {
+            assert_eq!(*weight > 0.0, range_m >= 350.0, "{range_m}: {weight}");
+        }
+    }
 }

@@ -7,7 +7,7 @@ use crate::SPEED_OF_LIGHT_M_S;
 use crate::beams::Schedule;
 use crate::plan::scan_lines;
 use crate::plan::wind::SceneWind;
-use crate::scene::{Scene, SceneFile};
+use crate::scene::{Scene, SceneFile, WindOfPulses};
 use wakescope_signal::{LayerLimits, Pulse};
 
 /// Layers of scenes with a transported pair are this many times as thick as the rule of [`Pulse::layer_thickness_m`] has them, that is
@@ -62,7 +62,7 @@ impl Geometry {
             .map(|line| schedule.middle(line))
             .collect();
         let line_time_s: Vec<f64> = middles.iter().map(|beam| beam.time_s).collect();
-        let max_gradient_per_s = wind.max_gradient_per_s(&line_time_s);
+        let max_gradient_per_s = wind.max_gradient_per_s(&wind_times_s(scene, &schedule));
         let sample_spacing_m = scene.sample_spacing_m();
         let samples = scene.samples_per_record();
         let window = scene.estimator.window_samples;
@@ -107,6 +107,17 @@ impl Geometry {
     /// Centre of each layer along a line, m.
     pub fn layer_range_m(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.layers).map(|l| self.first_layer_range_m + l as f64 * self.layer_thickness_m)
+    }
+}
+
+/// Times from the start of the scan for which a wind is asked, s: the middle of each line, or its first and last pulse where pulses have
+/// winds of their own.
+pub(crate) fn wind_times_s(scene: &Scene, schedule: &Schedule) -> Vec<f64> {
+    match scene.scan.wind_of_pulses {
+        WindOfPulses::Line {} => (0..schedule.lines.len())
+            .map(|line| schedule.middle(line).time_s)
+            .collect(),
+        WindOfPulses::Pulse {} => schedule.ends().map(|beam| beam.time_s).collect(),
     }
 }
 

@@ -153,9 +153,11 @@ impl Plan {
         &self.file.content
     }
 
-    /// Time of the last line from the start of the flow, s.
+    /// Time of the last wind of the scan from the start of the flow, s: of the middle of the last line, or of its last pulse where pulses
+    /// have winds of their own.
     pub fn scan_end_s(&self) -> f64 {
-        self.wind.start_s + self.geometry.line_time_s.last().copied().unwrap_or(0.0)
+        let times_s = geometry::wind_times_s(self.scene(), &self.geometry.schedule);
+        self.wind.start_s + times_s.last().copied().unwrap_or(0.0)
     }
 
     /// Age of the wake at the end of the scan, s; behind an aircraft that in the plane of the lidar.
@@ -264,5 +266,37 @@ impl fmt::Display for Plan {
             writeln!(f, "  warning: {w}")?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    /// Two lines of 16 pulses through a pair that lives for some minutes.
+    fn planned(pulse_repetition_hz: f64, wind_of_pulses: &str) -> Result<Plan, Error> {
+        let text = format!(
+            "[flow]\nmotion = \"transported\"\n[laser]\npulse_repetition_hz = {pulse_repetition_hz:?}\n\
+             [scan]\nelevation_min_rad = 0.0\nelevation_max_rad = 0.25\nelevation_step_rad = 0.25\n\
+             wind_of_pulses = {{ kind = \"{wind_of_pulses}\" }}\n"
+        );
+        let file = SceneFile::parse(&text, Path::new("s.toml")).unwrap();
+        Plan::new(file, Target::Signal)
+    }
+
+    #[test]
+    fn a_flow_must_last_to_the_last_wind_that_a_scan_asks_for() {
+        let quick = planned(400.0, "pulse").unwrap();
+        let start_s = quick.wind.start_s;
+        assert!((quick.scan_end_s() - start_s - 31.0 / 400.0).abs() < 1e-9);
+        let of_lines = planned(400.0, "line").unwrap();
+        assert!((of_lines.scan_end_s() - start_s - 23.5 / 400.0).abs() < 1e-9);
+        // The pair ends between the middle of the last line and its last pulse.
+        let slow_hz = 27.0 / (quick.wind.end_s - start_s);
+        assert!(planned(slow_hz, "line").is_ok());
+        let refused = planned(slow_hz, "pulse").map(|plan| plan.scan_end_s());
+        let message = refused.unwrap_err().to_string();
+        assert!(message.contains("the scan ends at"), "{message}");
     }
 }

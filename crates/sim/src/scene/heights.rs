@@ -12,8 +12,6 @@ const VISIBILITY: Number = Number(
     |value| (aerosol::LEAST_VISIBILITY_M..=1e6).contains(&value),
     "from 1000 to 1e6 {}: fog is not modelled",
 );
-/// Height above which a table of Cn2 has no end, m.
-const NO_END_M: f64 = 1e8;
 
 keys! {
     /// Aerosol from a visibility or over height, in place of one backscatter and extinction.
@@ -114,25 +112,13 @@ impl Cn2Profile {
                 };
                 Cn2Path::from_law(law, telescope_height_m, elevation_rad)
             }
-            Self::Table(table) => {
-                let mut height_m = table.heights_m.clone();
-                let mut cn2_m_m23 = table.values_m_m23.clone();
-                // Constant beyond the ends.
-                if height_m.first().is_some_and(|first_m| *first_m > 0.0) {
-                    height_m.insert(0, 0.0);
-                    cn2_m_m23.splice(..0, table.values_m_m23.first().copied());
-                }
-                if !height_m.is_empty() {
-                    height_m.push(NO_END_M);
-                    cn2_m_m23.extend(table.values_m_m23.last());
-                }
-                Cn2Path::Heights {
-                    height_m,
-                    cn2_m_m23,
-                    telescope_height_m,
-                    elevation_rad,
-                }
-            }
+            // Constant beyond the ends.
+            Self::Table(table) => Cn2Path::Heights {
+                height_m: table.heights_m.clone(),
+                cn2_m_m23: table.values_m_m23.clone(),
+                telescope_height_m,
+                elevation_rad,
+            },
         }
     }
 
@@ -178,6 +164,34 @@ impl Cn2Profile {
         match self {
             Self::HufnagelValley { .. } => None,
             Self::Table(table) => table.heights_m.last().copied(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cn2_below_the_lowest_and_above_the_highest_height_is_that_of_the_end() {
+        let table = Cn2Profile::Table(Cn2Table {
+            heights_m: vec![5.0, 50.0],
+            values_m_m23: vec![4e-14, 1e-14],
+        });
+        let law = Cn2Profile::HufnagelValley {
+            high_wind_m_s: 21.0,
+            ground_cn2_m_m23: 1.7e-14,
+        };
+        // To 100 m below the lidar and as far above it.
+        let slope_rad = 0.5_f64.asin();
+        let ground = hufnagel_valley_m_m23(0.0, 21.0, 1.7e-14);
+        for (profile, elevation_rad, expected) in [
+            (&table, -slope_rad, 4e-14),
+            (&table, slope_rad, 1e-14),
+            (&law, -slope_rad, ground),
+        ] {
+            let found = profile.along(20.0, elevation_rad).at(200.0);
+            assert_eq!(found.unwrap(), expected, "{elevation_rad}");
         }
     }
 }

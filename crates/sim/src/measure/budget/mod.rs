@@ -192,7 +192,7 @@ impl Budget {
         let wide = self.sums().iter().map(|db| db + gain_db).collect();
         self.push("= in the width of the pulse", "", value, wide);
         if scene.scan.second_trip.is_some() {
-            let echoes = self.at_each(&|range_m| second_trip(scene, instrument, range_m))?;
+            let echoes = self.at_each(&|range_m| second_trip(plan, range_m))?;
             let value = format!(
                 "from {} farther",
                 si(ambiguous_range_m(scene.laser.pulse_repetition_hz), "m")
@@ -454,12 +454,21 @@ impl Budget {
     }
 }
 
-/// Echo of the pulse before over that of the last.
-fn second_trip(scene: &Scene, instrument: &Instrument, range_m: f64) -> Result<f64, Error> {
-    let far_m = range_m + ambiguous_range_m(scene.laser.pulse_repetition_hz);
+/// Echo of the pulse before over that of the last, on the line in the middle of the scan: none from below the ground and none at ranges
+/// from which the receiver is blind; NaN where the last pulse has no echo.
+fn second_trip(plan: &Plan, range_m: f64) -> Result<f64, Error> {
+    let instrument = &plan.instrument;
+    let schedule = &plan.geometry.schedule;
+    let far_m = range_m + ambiguous_range_m(plan.scene().laser.pulse_repetition_hz);
+    let middle = schedule.middle(schedule.lines.len() / 2);
+    if range_m < instrument.blind_range_m || middle.at_range_m(far_m)[2] < 0.0 {
+        return Ok(0.0);
+    }
     let efficiency = efficiency_by_theory(instrument, &[range_m, far_m])?;
     let power = |r: f64| Ok::<_, Error>(instrument.return_per_m(r)? * efficiency.interpolated(r)?);
-    Ok(power(far_m)? / power(range_m)?)
+    let last = power(range_m)?;
+    let before = power(far_m)?;
+    Ok(if last > 0.0 { before / last } else { f64::NAN })
 }
 
 #[cfg(test)]
@@ -593,6 +602,29 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// Row of the pulse before at 320 m, where the receiver is blind, and at 360 m: pulses 1.5 km apart from a lidar 60 m above ground.
+    fn second_trip_db(scan: &str, air: &str) -> Vec<f64> {
+        let text = format!(
+            "[laser]\npulse_repetition_hz = 100e3\n[telescope]\nblind_range_m = 350.0\n\
+             [scan]\nlidar_height_m = 60.0\nrange_min_m = 300.0\nrange_max_m = 400.0\nsecond_trip = {{}}\n{scan}\n{air}"
+        );
+        let rows = budget(&text, &[320.0, 360.0]).rows;
+        let row = rows.iter().find(|row| row.name.contains("pulse before"));
+        row.unwrap().db.clone()
+    }
+
+    #[test]
+    fn the_pulse_before_has_no_echo_at_blind_ranges_from_below_the_ground_or_beside_none() {
+        let level = "elevation_min_rad = 0.0\nelevation_max_rad = 0.01";
+        let seen_db = second_trip_db(level, "");
+        assert_eq!(seen_db[0], f64::NEG_INFINITY);
+        assert!(seen_db[1].is_finite() && seen_db[1] < -5.0, "{seen_db:?}");
+        let down = "elevation_min_rad = -0.1\nelevation_max_rad = -0.09";
+        assert_eq!(second_trip_db(down, ""), [f64::NEG_INFINITY; 2]);
+        let clear = "[atmosphere]\nbackscatter_per_m_sr = 0.0\n";
+        assert!(second_trip_db(level, clear)[1].is_nan());
     }
 
     #[test]
