@@ -18,6 +18,15 @@ pub(crate) fn sampled_velocities_m_s(scene: &Scene) -> (f64, f64) {
     }
 }
 
+/// Width after which velocities of complex samples repeat, m/s; none of real ones, which are mirrored.
+pub(crate) fn fold_m_s(scene: &Scene) -> Option<f64> {
+    let (least_m_s, largest_m_s) = sampled_velocities_m_s(scene);
+    match scene.detector.signal {
+        DetectorSignal::IntermediateFrequency => None,
+        DetectorSignal::Baseband => Some(largest_m_s - least_m_s),
+    }
+}
+
 /// Pulse and acquisition of a scene.
 pub(crate) fn pulse_info(scene: &Scene) -> PulseInfo {
     let (least_m_s, largest_m_s) = sampled_velocities_m_s(scene);

@@ -9,6 +9,7 @@ use crate::io::scans::ReadScan;
 use crate::measure::recorded::{MeasuredScan, samples, upward};
 use crate::measure::response::SceneResponse;
 use crate::plan::Plan;
+use crate::plan::described::fold_m_s;
 use crate::progress::Observer;
 use crate::scene::DetectorSignal;
 use ndarray::{Array2, ArrayView2, Axis};
@@ -176,7 +177,7 @@ pub(super) fn scan_of_lines(
             range_m,
             velocity_m_s,
             sigma_m_s: None,
-            fold_m_s: None,
+            fold_m_s: fold_m_s(plan.scene()),
         },
     )
 }

@@ -6,6 +6,7 @@
 use crate::measure::response::SceneResponse;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
+use crate::plan::described::fold_m_s;
 use crate::scene::{Flow, VortexPair};
 use ndarray::{Array2, s};
 use wakescope_estimate::map::ErrorStatistics;
@@ -92,6 +93,7 @@ impl<'p> Retrieval<'p> {
             free: free(),
             core_radius_m,
             correlated_lines,
+            fold_m_s: fold_m_s(scene),
             ..Default::default()
         };
         let fitted = fit_map_of_estimator(&map, &self.model(), &shown, &options);
@@ -218,12 +220,8 @@ mod tests {
 
     #[test]
     fn what_was_never_tried_did_not_fail() {
-        let plan = plan(|scene| scene.detector.signal = crate::scene::DetectorSignal::Baseband);
-        let mut retrieval = Retrieval::new(&plan, &Scanner::new(&plan, &Silent).unwrap()).unwrap();
-        retrieval.add(&Array2::zeros((
-            plan.geometry.elevation_rad.len(),
-            plan.geometry.gate_range_m.len(),
-        )));
+        let plan = plan(|_| ());
+        let retrieval = Retrieval::new(&plan, &Scanner::new(&plan, &Silent).unwrap()).unwrap();
         let found = retrieval.result();
         assert!(
             found[4].is_nan() && found[2].is_nan() && found[5] > 0.0,

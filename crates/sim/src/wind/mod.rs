@@ -129,6 +129,7 @@ pub fn wind_profiles(
             &window.rays,
             &bins,
             options,
+            components.kind == Kind::Plane && options.cross_winds.is_empty(),
             |height_m, mean_m_s| {
                 carried_m_s(components.kind, mean_m_s, || {
                     nearest_m_s(&options.cross_winds, window, reference, height_m)

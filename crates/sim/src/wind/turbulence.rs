@@ -5,6 +5,7 @@
 //! Check: `wind` in the tests of the program.
 
 use super::WindOptions;
+use super::directions::dot;
 use super::heights::{Bin, BinWind, Cell, FoundWind};
 use crate::Error;
 use crate::io::scans::Ray;
@@ -82,12 +83,14 @@ fn have_sigmas(bins: &[Bin]) -> bool {
     cells.all(|cell| cell.sigma_m_s > 0.0 && cell.sigma_m_s.is_finite())
 }
 
-/// The layers of one window with the velocity by which the air is carried through each, if it is known: else each line is a block.
+/// The layers of one window with the velocity by which the air is carried through each, if it is known: else each line is a block. Where it is known
+/// but for the part across the plane of the scan (`has_wind_across`), each pass of the scan sees air of its own.
 pub(super) fn layers(
     window: usize,
     rays: &[Ray],
     bins: &[Bin],
     options: &WindOptions,
+    has_wind_across: bool,
     carried: impl Fn(f64, [f64; 3]) -> Option<[f64; 3]>,
 ) -> Vec<Layer> {
     let mut numbers: BTreeMap<i64, Vec<&Bin>> = BTreeMap::new();
@@ -111,11 +114,10 @@ pub(super) fn layers(
         let mut blocks = Vec::new();
         for first in 0..strides {
             let own = interleaved(&lines, first, strides, rays);
-            blocks.extend(
-                cut(&own, is_known)
-                    .iter()
-                    .map(|block| Block::new(block, carried_m_s)),
-            );
+            for pass in passes(&own, has_wind_across) {
+                let cut = cut(pass, is_known);
+                blocks.extend(cut.iter().map(|block| Block::new(block, carried_m_s)));
+            }
         }
         layers.push(Layer {
             key: (window, number),
@@ -192,7 +194,7 @@ fn unfolded_m_s(cell: &Cell, found: &FoundWind) -> f64 {
     };
     let mut expected_m_s = 0.0;
     for (axis, wind_m_s) in found.axes.iter().zip(&found.fit.wind_m_s) {
-        expected_m_s += super::directions::dot(*axis, cell.direction) * wind_m_s;
+        expected_m_s += dot(*axis, cell.direction) * wind_m_s;
     }
     let away_m_s = cell.velocity_m_s - expected_m_s;
     cell.velocity_m_s - fold_m_s * (away_m_s / fold_m_s).round()
@@ -214,6 +216,31 @@ fn interleaved(lines: &Lines, first: usize, strides: usize, rays: &[Ray]) -> Vec
     }
     own.sort_by(|a, b| a.0.total_cmp(&b.0));
     own.into_iter().map(|(_, gates)| gates).collect()
+}
+
+/// Runs of lines in whose order the beam turns one way, or all lines.
+fn passes(lines: &[Vec<GateSample>], has_wind_across: bool) -> Vec<&[Vec<GateSample>]> {
+    if !has_wind_across {
+        return vec![lines];
+    }
+    let mut passes = Vec::new();
+    let mut first = 0;
+    let mut last_step = [0.0; 3];
+    for next in 1..lines.len() {
+        let [last, own] = [next - 1, next].map(|line| lines[line][0].direction);
+        let step: [f64; 3] = std::array::from_fn(|d| own[d] - last[d]);
+        if step == [0.0; 3] {
+            continue;
+        }
+        // The step back to where the last pass began belongs to neither.
+        if dot(step, last_step) < 0.0 && next - first > 1 {
+            passes.push(&lines[first..next]);
+            first = next;
+        }
+        last_step = step;
+    }
+    passes.push(&lines[first..]);
+    passes
 }
 
 /// Blocks of equal runs of lines; of single lines unless the air is known to be carried.
@@ -392,4 +419,35 @@ fn averaged(
         eps23_weights,
         has_sigmas: layer.has_sigmas,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_end_where_the_beam_turns_back() {
+        let of_degrees = |degrees: &[i32]| {
+            let mut lines = Vec::new();
+            for elevation_deg in degrees {
+                let (up, along) = f64::from(*elevation_deg).to_radians().sin_cos();
+                lines.push(vec![GateSample {
+                    time_s: 0.0,
+                    direction: [along, 0.0, up],
+                    range_m: 100.0,
+                    velocity_m_s: 0.0,
+                    noise_std_m_s: 1.0,
+                }]);
+            }
+            let lengths = passes(&lines, true).iter().map(|pass| pass.len()).collect();
+            assert_eq!(passes(&lines, false).len(), 1);
+            lengths
+        };
+        let forth_and_back: Vec<usize> = of_degrees(&[10, 20, 30, 30, 20, 10]);
+        assert_eq!(forth_and_back, [4, 2]);
+        let over_and_over: Vec<usize> = of_degrees(&[10, 20, 30, 10, 20, 30, 10, 20, 30]);
+        assert_eq!(over_and_over, [3, 3, 3]);
+        let of_one: Vec<usize> = of_degrees(&[10]);
+        assert_eq!(of_one, [1]);
+    }
 }

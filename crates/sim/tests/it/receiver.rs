@@ -108,7 +108,7 @@ fn a_map_has_the_ratio_of_the_scene_with_a_converter_of_few_bits() {
         (-3.0, 3, 8.0, ""),
         (5.0, 3, 8.0, ""),
         (-3.0, 3, 8.0, "noise = \"white\""),
-        (-3.0, 3, 8.0, "signal = \"baseband\""),
+        (-3.0, 3, 5.0, "signal = \"baseband\""),
     ] {
         let found_db = of_map(snr_db, bits, full_scale, words);
         assert!(
