@@ -110,6 +110,7 @@ pub(crate) fn read(path: &Path) -> Result<String> {
 ///
 /// # Errors
 /// As [`read`], but for more than 1 GiB.
+#[cfg(feature = "cli")]
 pub(crate) fn read_data(path: &Path) -> Result<String> {
     read_at_most(path, LARGEST_DATA_BYTES, "divide it")
 }
@@ -156,6 +157,7 @@ mod tests {
             .set_len(LARGEST_BYTES + 1)
             .unwrap();
         assert!(read(&path).unwrap_err().to_string().contains("16 MiB"));
+        #[cfg(feature = "cli")]
         assert!(read_data(&path).is_ok());
         assert!(
             read(folder.path())

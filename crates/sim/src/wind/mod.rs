@@ -27,6 +27,7 @@ mod windows;
 pub use cross_wind::CrossWind;
 pub use directions::Kind;
 pub use netcdf::netcdf;
+#[cfg(feature = "cli")]
 pub(crate) use of_map::gate_stride;
 pub use of_map::{table_with_truth, winds_of_map};
 #[cfg(feature = "plots")]
