@@ -26,7 +26,8 @@ const NODES: [(f64, f64); 7] = [
     (2.366_759_410_734_541, 3.075_712_396_758_65e-2),
     (3.750_439_717_725_742, 5.482_688_559_722_18e-4),
 ];
-/// Those of three nodes, exact for gates that are so many standard deviations apart to 1e-6 of the correlation.
+/// The rule of three nodes, for gates at least [`FAR_APART`] standard deviations apart: the sixth moment, the first that it misses, changes a
+/// correlation that grows with the distance to the power of 2/3 by less than 1e-6 there.
 const FAR_NODES: [(f64, f64); 3] = [
     (-1.732_050_807_568_877_2, 1.0 / 6.0),
     (0.0, 2.0 / 3.0),

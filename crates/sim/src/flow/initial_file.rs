@@ -15,7 +15,7 @@ use std::path::Path;
 use wakescope_les::solver::Ends;
 use wakescope_les::{Direction, Mesh};
 
-/// From the last node of a period to the first of the next one may be so many times the largest distance of two nodes.
+/// Largest distance from the last node of a period to the first of the next one, over the largest distance of two nodes.
 const MOST_OPEN: f64 = 1.5;
 
 /// A node of the target takes its value from these nodes of the source.

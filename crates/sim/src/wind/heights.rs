@@ -119,8 +119,8 @@ impl FoundWind {
         noise
     }
 
-    /// Two choices of at most `most` of the velocities, each with the number of velocities that it stands for: one of each run of velocities of the
-    /// same direction. Sums over all pairs of velocities have, in the mean over choices, those over pairs of one of each; of a single choice
+    /// Two choices of at most `most` of the velocities, each with the number of velocities that it stands for: one of each run of
+    /// velocities of nearly the same direction. Sums over all pairs of velocities have, in the mean over choices, those over pairs of one of each; of a single choice
     /// taken twice each velocity would be paired with itself, for all of its run.
     pub(super) fn thinned(&self, most: usize) -> [Vec<(usize, f64)>; 2] {
         let mut order: Vec<usize> = (0..self.used.len()).collect();

@@ -540,8 +540,8 @@ fn errors_of_winds_of_gates_that_overlap_are_as_large_as_stated() {
     }
 }
 
-/// Four beams in turn, each 150 times, in noise of 0.3 m/s: of so many velocities of a height some stand for the others in the turbulence, and
-/// they must be of all beams.
+/// Four beams in turn, each 150 times, in noise of 0.3 m/s. Some of the 600 velocities of a height stand for the others where turbulence is
+/// concerned, and they must be of all beams.
 #[test]
 fn errors_of_many_turns_of_four_beams_are_those_of_their_noise() {
     let temp = tempfile::tempdir().unwrap();
