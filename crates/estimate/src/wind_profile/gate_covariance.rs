@@ -372,3 +372,38 @@ fn correlation_along(correlation: &Correlation, per_w: f64, across_m: f64, posit
     let (f, g) = correlation.at(r2.cbrt() * per_w);
     f - g * across2 / r2
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// On either side of the distance from which beams that are not parallel take three nodes.
+    #[test]
+    fn three_nodes_of_far_gates_give_the_covariance_of_seven() {
+        let gate_std_m = 14.0;
+        let covariance = GateCovariance::new(gate_std_m, &[30.0, 300.0], 1000.0).unwrap();
+        let at = |apart_m: f64, beam: [f64; 3]| {
+            let own = GatePosition {
+                position_m: [0.0; 3],
+                direction: [0.0, 0.0, 1.0],
+            };
+            let other = GatePosition {
+                position_m: [0.6 * apart_m, 0.0, 0.8 * apart_m],
+                direction: beam,
+            };
+            let mut out = [0.0; 2];
+            covariance.covariance_into(&own, &other, &mut out);
+            out
+        };
+        let limit_m = FAR_APART * gate_std_m;
+        for beam in [[0.6, 0.0, 0.8], [0.0, 0.6, 0.8], [-0.6, 0.0, 0.8]] {
+            let near = at(limit_m * (1.0 - 1e-9), beam);
+            let far = at(limit_m * (1.0 + 1e-9), beam);
+            let own = at(0.0, [0.0, 0.0, 1.0]);
+            for scale in 0..2 {
+                let error = (far[scale] - near[scale]).abs() / own[scale];
+                assert!(error < 2e-6, "{beam:?}: {error}");
+            }
+        }
+    }
+}

@@ -273,7 +273,9 @@ impl RadialVelocities<'_> {
     }
 
     fn largest_std_m_s(&self) -> f64 {
-        (LARGEST_STD * self.half_band_m_s).max(LEAST_STD_M_S)
+        let bands_m_s = (0..self.velocity_m_s.len()).map(|index| self.band_m_s(index));
+        let narrowest_m_s = bands_m_s.fold(2.0 * self.half_band_m_s, f64::min);
+        (LARGEST_STD * 0.5 * narrowest_m_s).max(LEAST_STD_M_S)
     }
 
     /// Probability of each velocity to be good, and its residual \[m/s\].

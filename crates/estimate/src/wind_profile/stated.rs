@@ -9,7 +9,7 @@
 //! The sandwich takes blocks that a likelihood counts as independent for what they are (Godambe 1960). Check: `edr_stated.csv`; a
 //! single block has J = H.
 
-use ndarray::{Array2, Axis};
+use ndarray::{Array2, ArrayView2, Axis};
 use std::collections::BTreeMap;
 
 use super::gate_covariance::{GateCovariance, GatePosition};
@@ -26,31 +26,29 @@ const LEAST_NOISE: f64 = 1e-4;
 /// Steps in which displacements of blocks are compared \[m\].
 const SAME_DISPLACEMENT_M: f64 = 1e-3;
 
-/// Covariance of a wind u = G v by turbulence alone \[m²/s²\], from its gain G \[component, velocity\] and the gates, and for each outer scale of
-/// the covariance its probability times eps^(2/3). Both are given twice: all gates, or two choices of gates that stand for the others.
+/// Covariance of a wind u = G v by turbulence alone \[m²/s²\], from its gain G \[component, velocity\], the gates and, for each outer scale of
+/// the covariance, its probability times eps^(2/3).
 ///
 /// # Errors
 /// [`Error::Length`] for shapes that do not fit.
 pub fn wind_covariance(
-    choices: [(Array2<f64>, Vec<GatePosition>); 2],
+    gain: ArrayView2<'_, f64>,
+    gates: &[GatePosition],
     covariance: &GateCovariance,
     eps23_weights: &[f64],
 ) -> Result<Array2<f64>, Error> {
-    for (gain, gates) in &choices {
-        length("gates", gain.ncols(), gates.len())?;
-    }
+    length("gates", gain.ncols(), gates.len())?;
     length("eps23_weights", covariance.len(), eps23_weights.len())?;
-    let [(gain_a, gates_a), (gain_b, gates_b)] = &choices;
-    let mut total = Array2::zeros((gates_a.len(), gates_b.len()));
-    for (matrix, weight) in covariance
-        .between(gates_a, gates_b)
-        .iter()
-        .zip(eps23_weights)
-    {
+    let mut total = Array2::zeros((gates.len(), gates.len()));
+    for (matrix, weight) in covariance.matrices(gates).iter().zip(eps23_weights) {
         total.scaled_add(*weight, matrix);
     }
-    let half = gain_a.dot(&total).dot(&gain_b.t());
-    Ok((&half + &half.t()) * 0.5)
+    for i in 0..gates.len() {
+        for j in 0..i {
+            total[[j, i]] = total[[i, j]];
+        }
+    }
+    Ok(gain.dot(&total).dot(&gain.t()))
 }
 
 /// Covariance of eps^(2/3) and of the variance of the noise with the eddies that blocks share, at the only outer scale \[m\] of a covariance.

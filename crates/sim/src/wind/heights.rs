@@ -19,8 +19,8 @@ const SAME_HEIGHT_M: f64 = 1e-3;
 /// Step of heights of scans of several elevations, m.
 const USUAL_STEP_M: f64 = 25.0;
 
-/// Steps of a sequence of low discrepancy in two dimensions (Roberts 2018, the R2 sequence).
-const STEPS: [f64; 2] = [0.754_877_666_2, 0.569_840_291_0];
+/// Step of a sequence of low discrepancy: the golden ratio less 1.
+const GOLDEN: f64 = 0.618_033_988_7;
 
 /// A velocity of one gate.
 #[derive(Debug, Clone, Copy)]
@@ -119,32 +119,32 @@ impl FoundWind {
         noise
     }
 
-    /// Two choices of at most `most` of the velocities, each with the number of velocities that it stands for: one of each run of
-    /// velocities of nearly the same direction. Sums over all pairs of velocities have, in the mean over choices, those over pairs of one of each; of a single choice
-    /// taken twice each velocity would be paired with itself, for all of its run.
-    pub(super) fn thinned(&self, most: usize) -> [Vec<(usize, f64)>; 2] {
-        let mut order: Vec<usize> = (0..self.used.len()).collect();
-        order.sort_by(|i, j| {
-            let [one, other] = [i, j].map(|index| self.used[*index].direction);
-            let by_azimuth = one[0].atan2(one[1]).total_cmp(&other[0].atan2(other[1]));
-            by_azimuth.then(one[2].total_cmp(&other[2]))
-        });
-        let length = order.len().div_ceil(most).max(1);
-        STEPS.map(|step| {
-            let mut chosen = Vec::with_capacity(most);
-            for (number, run) in order.chunks(length).enumerate() {
-                let part = (0.5 + step * number as f64).fract();
-                let index = (part * run.len() as f64) as usize;
-                chosen.push((run[index.min(run.len() - 1)], run.len() as f64));
-            }
-            chosen
-        })
-    }
-
     /// Probabilities of the velocities of this bin to be good.
     pub(super) fn own_weights(&self, count: usize) -> &[f64] {
         &self.fit.weights[self.first_own..self.first_own + count]
     }
+}
+
+/// At most `most` of velocities in these directions, each with the number of velocities that it stands for: one of each run of velocities of nearly
+/// the same direction, at places that differ from run to run. Variances of sums are too large by it, as each is paired with itself for all
+/// of its run, and never negative.
+pub(super) fn thinned(directions: &[[f64; 3]], most: usize) -> Vec<(usize, f64)> {
+    let mut order: Vec<usize> = (0..directions.len()).collect();
+    let length = order.len().div_ceil(most).max(1);
+    if length > 1 {
+        order.sort_by(|i, j| {
+            let [one, other] = [i, j].map(|index| directions[*index]);
+            let by_azimuth = one[0].atan2(one[1]).total_cmp(&other[0].atan2(other[1]));
+            by_azimuth.then(one[2].total_cmp(&other[2]))
+        });
+    }
+    let mut chosen = Vec::with_capacity(most);
+    for (number, run) in order.chunks(length).enumerate() {
+        let part = (0.5 + GOLDEN * number as f64).fract();
+        let index = (part * run.len() as f64) as usize;
+        chosen.push((run[index.min(run.len() - 1)], run.len() as f64));
+    }
+    chosen
 }
 
 /// The velocities of rays.
@@ -403,4 +403,53 @@ fn wind_of_bins(
         used,
         first_own,
     })))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mean over the velocities of half an hour and more of DBS, a turn in 8 s, with a correlation that falls in 60 s.
+    #[test]
+    fn some_velocities_stand_for_all_of_each_direction() {
+        let beams = [
+            [0.5, 0.0, 0.9],
+            [0.0, 0.5, 0.9],
+            [-0.5, 0.0, 0.9],
+            [0.0, -0.5, 0.9],
+            [0.0, 0.0, 1.0],
+        ];
+        let correlation = |i: usize, j: usize| (-(i.abs_diff(j) as f64) * 1.6 / 60.0).exp();
+        for turns in [240, 720] {
+            let directions = beams.repeat(turns);
+            let chosen = thinned(&directions, 800);
+            assert!(chosen.len() <= 800);
+            for beam in beams {
+                let own = chosen.iter().filter(|(i, _)| directions[*i] == beam);
+                let count: f64 = own.map(|(_, count)| count).sum();
+                assert!(
+                    (count / turns as f64 - 1.0).abs() < 0.02,
+                    "{beam:?}: {count}"
+                );
+            }
+            let mut exact = 0.0;
+            for i in 0..directions.len() {
+                let near = i.saturating_sub(400)..(i + 400).min(directions.len());
+                exact += near.map(|j| correlation(i, j)).sum::<f64>();
+            }
+            let mut found = 0.0;
+            for (i, of_i) in &chosen {
+                for (j, of_j) in &chosen {
+                    found += of_i * of_j * correlation(*i, *j);
+                }
+            }
+            assert!(
+                (0.98..1.2).contains(&(found / exact)),
+                "{turns}: {}",
+                found / exact
+            );
+        }
+        let all = thinned(&beams, 800);
+        assert_eq!(all, [0, 1, 2, 3, 4].map(|index| (index, 1.0)));
+    }
 }

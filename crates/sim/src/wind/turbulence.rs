@@ -6,7 +6,7 @@
 
 use super::WindOptions;
 use super::directions::dot;
-use super::heights::{Bin, BinWind, Cell, FoundWind};
+use super::heights::{Bin, BinWind, Cell, FoundWind, thinned};
 use crate::Error;
 use crate::io::scans::Ray;
 use ndarray::Array2;
@@ -25,7 +25,7 @@ const GOOD: f64 = 0.5;
 /// Wind across a stare whose wind is not known, m/s: for standard deviations alone.
 const ASSUMED_WIND_M_S: f64 = 5.0;
 /// Most velocities of one height whose shared eddies are counted.
-const MOST_SHARED: usize = 400;
+const MOST_SHARED: usize = 800;
 
 /// Turbulence of a layer of one window.
 #[derive(Debug, Clone)]
@@ -330,16 +330,17 @@ impl RunTurbulence {
             return Ok(None);
         };
         let carried_m_s = self.carried_m_s.get(&key).copied().unwrap_or_default();
+        let directions: Vec<[f64; 3]> = found.used.iter().map(|cell| cell.direction).collect();
+        let chosen = thinned(&directions, MOST_SHARED);
+        let mut gain = Array2::zeros((found.gain.nrows(), chosen.len()));
+        let mut gates = Vec::with_capacity(chosen.len());
+        for (mut column, (index, count)) in gain.columns_mut().into_iter().zip(chosen) {
+            column.assign(&(&found.gain.column(index) * count));
+            gates.push(gate_position(&found.used[index], rays, carried_m_s));
+        }
         let of_air = wakescope_estimate::wind_profile::wind_covariance(
-            found.thinned(MOST_SHARED).map(|chosen| {
-                let mut gain = Array2::zeros((found.gain.nrows(), chosen.len()));
-                let mut gates = Vec::with_capacity(chosen.len());
-                for (mut column, (index, count)) in gain.columns_mut().into_iter().zip(chosen) {
-                    column.assign(&(&found.gain.column(index) * count));
-                    gates.push(gate_position(&found.used[index], rays, carried_m_s));
-                }
-                (gain, gates)
-            }),
+            gain.view(),
+            &gates,
             covariance,
             &turbulence.eps23_weights,
         )?;

@@ -244,19 +244,25 @@ fn scans_of_a_table_without_a_column_for_them_are_told_apart_by_their_times() {
     let folder = temp.path();
     let mut rays = Vec::new();
     for (number, y_m) in [[400.0, 440.0], [415.0, 455.0]].into_iter().enumerate() {
-        let mut directions = up(90.0 + 0.01 * number as f64);
+        // To the north and, read back, on the other side of it.
+        let azimuth = [359.995, 0.005][number];
+        let mut directions = up(azimuth);
         for (line, (_, elevation)) in directions.iter_mut().enumerate() {
             *elevation += 0.02 * ((line * 7 + 3 * number) % 5) as f64;
         }
         let wake = pair(y_m, 45.0, 400.0, 2.0);
-        rays.extend(scan(&wake, 90.0, &directions, 20.0 * number as f64, FIRST));
+        rays.extend(scan(&wake, 0.0, &directions, 20.0 * number as f64, FIRST));
     }
     fs::write(folder.join("two.csv"), csv(&rays, FIRST)).unwrap();
     let (table, warned) = retrieved(folder, &["two.csv"]);
     assert_eq!(warned, "");
     let expected = [(400, "left"), (440, "right"), (415, "left"), (455, "right")]
-        .map(|(y_m, side)| (90, side.to_owned(), y_m));
-    assert_eq!(summary(&table), expected);
+        .map(|(y_m, side)| (side.to_owned(), y_m));
+    let found: Vec<(String, i64)> = summary(&table)
+        .into_iter()
+        .map(|(_, side, y_m)| (side, y_m))
+        .collect();
+    assert_eq!(found, expected);
 }
 
 /// Elevations from 20 to 160 degrees, as a scanner has them that turns its azimuth at the zenith.
@@ -295,6 +301,10 @@ fn a_scan_over_the_zenith_sees_one_wake_and_all_of_its_plane_have_one_azimuth() 
             assert!(number(&track, row, "y_rate_m_s").abs() < 0.1, "{files:?}");
         }
     }
+    // In a table without sweeps the times tell both ways apart.
+    fs::write(folder.join("both.csv"), csv(&both, 2)).unwrap();
+    let (table, _) = retrieved(folder, &["both.csv"]);
+    assert_eq!(table.rows.len(), 4);
     // Alone, the way back is seen with the azimuth with which it begins.
     let (table, _) = retrieved(folder, &["back.csv"]);
     let mirrored = [(20, "left".to_owned(), -25), (20, "right".to_owned(), 15)];

@@ -540,12 +540,12 @@ fn errors_of_winds_of_gates_that_overlap_are_as_large_as_stated() {
     }
 }
 
-/// Four beams in turn, each 150 times, in noise of 0.3 m/s. Some of the 600 velocities of a height stand for the others where turbulence is
+/// Four beams in turn, each 250 times, in noise of 0.3 m/s. Some of the 1000 velocities of a height stand for the others where turbulence is
 /// concerned, and they must be of all beams.
 #[test]
 fn errors_of_many_turns_of_four_beams_are_those_of_their_noise() {
     let temp = tempfile::tempdir().unwrap();
-    let data = csv(temp.path(), "turns.csv", 2400, |row, cells| {
+    let data = csv(temp.path(), "turns.csv", 4000, |row, cells| {
         let beam = row / 4 % 4;
         let (east, north) = (90.0 * beam as f64).to_radians().sin_cos();
         let chance = (12.9898 * row as f64).sin() * 43_758.545_3;
@@ -553,9 +553,9 @@ fn errors_of_many_turns_of_four_beams_are_those_of_their_noise() {
         cells[1] = 90.0 * beam as f64;
         cells[4] = 0.5 * (4.0 * east - 3.0 * north) + noise_m_s;
     });
-    let rows = winds(&data, "--outer-scale 100");
+    let rows = winds(&data, "--outer-scale 100 --every 3600");
     assert_eq!(rows.len(), 4);
-    let expected_m_s = 0.3 / (60f64.to_radians().cos() * 300f64.sqrt());
+    let expected_m_s = 0.3 / (60f64.to_radians().cos() * 500f64.sqrt());
     for row in &rows {
         for name in ["east_std_m_s", "north_std_m_s"] {
             let over = number(row, name) / expected_m_s;

@@ -199,26 +199,32 @@ pub(super) fn in_any_order(rays: Vec<RayRow>) -> Result<Split, String> {
     split(rays, by_plane)
 }
 
+/// The scans of rays in the order of their times.
+///
+/// # Errors
+/// As [`in_order`].
+pub(super) fn in_time(mut rays: Vec<RayRow>) -> Result<Split, String> {
+    rays.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    in_order(rays)
+}
+
 /// The scans of rays in any order: those of the order of their times where these show several that cover the same elevations of a plane, else one
 /// for each plane.
 ///
 /// # Errors
 /// As [`in_any_order`].
 pub(super) fn in_time_or_any_order(rays: Vec<RayRow>) -> Result<Split, String> {
-    if rays.iter().all(|ray| ray.time_s.is_finite()) {
-        let mut in_time = rays.clone();
-        in_time.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-        if let Ok(found) = in_order(in_time)
-            && cover_elevations_again(&found.0)
-        {
-            return Ok(found);
-        }
+    if rays.iter().all(|ray| ray.time_s.is_finite())
+        && let Ok(found) = in_time(rays.clone())
+        && cover_elevations_again(&found.0)
+    {
+        return Ok(found);
     }
     in_any_order(rays)
 }
 
-/// Whether two scans of one plane have more than half of the elevations of one of them in common. Single wrong times cut a scan into parts that
-/// have not.
+/// Whether two scans of one plane, seen from either side, have more than half of the elevations of one of them in common. Single wrong times
+/// cut a scan into parts that have not.
 fn cover_elevations_again(scans: &[PlaneScan]) -> bool {
     let mut spans = Vec::with_capacity(scans.len());
     for scan in scans {
@@ -229,12 +235,12 @@ fn cover_elevations_again(scans: &[PlaneScan]) -> bool {
     }
     for (number, (azimuth_rad, low, high)) in spans.iter().enumerate() {
         for (other_rad, other_low, other_high) in &spans[..number] {
-            let apart_rad = azimuth_rad
+            let apart = azimuth_rad
                 .zip(*other_rad)
-                .map_or(0.0, |(a, b)| (a - b).abs());
+                .map_or(0.0, |(a, b)| (a - b).sin().abs());
             let common = high.min(*other_high) - low.max(*other_low);
             let shorter = (high - low).min(other_high - other_low);
-            if apart_rad < OFF_PLANE_RAD && shorter > 0.0 && common > 0.5 * shorter {
+            if apart < OFF_PLANE_RAD && shorter > 0.0 && common > 0.5 * shorter {
                 return true;
             }
         }

@@ -59,15 +59,19 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
         ));
     }
     for (sweep, velocities) in sweeps {
-        let (rays, range_m) = match grid(&velocities, false) {
-            Err(_) if velocities.iter().all(|row| row.time_s.is_finite()) => {
-                grid(&velocities, true)?
-            }
-            first => first?,
-        };
         let what = format!("sweep {sweep}");
-        let (scans, skipped) =
-            planes::in_time_or_any_order(rays).map_err(|reason| format!("{what}: {reason}"))?;
+        let (found_scans, range_m) = match grid(&velocities, false) {
+            // The same directions again, at other times: these alone tell the scans apart.
+            Err(_) if velocities.iter().all(|row| row.time_s.is_finite()) => {
+                let (rays, range_m) = grid(&velocities, true)?;
+                (planes::in_time(rays), range_m)
+            }
+            first => {
+                let (rays, range_m) = first?;
+                (planes::in_time_or_any_order(rays), range_m)
+            }
+        };
+        let (scans, skipped) = found_scans.map_err(|reason| format!("{what}: {reason}"))?;
         let skipped = skipped.iter().map(|text| format!("{what}: {text}"));
         found.skipped.extend(skipped);
         for scan in scans {
