@@ -419,16 +419,20 @@ fn read_input(
     Ok((scans, scene))
 }
 
-/// Where the track of the scans of its plane says that the wake of a scan is, to start from beside the blind search.
+/// Time after which a wake has left or decayed, and nothing is concluded from it \[s\].
+const REMEMBERED_S: f64 = 600.0;
+
+/// Where the track of the latest scans of its plane says that the wake of a scan is, to start from beside the blind search.
 fn prediction(before: &[RetrievedScan], scan: &ReadScan) -> Option<Wake> {
+    let time_s = Some(scan.map.middle_s()).filter(|time_s| time_s.is_finite())?;
     let mut same_plane = Vec::new();
     for one in before {
-        if are_of_one_plane(&one.scan, scan) {
+        let is_old = (time_s - one.scan.map.middle_s()).abs() > REMEMBERED_S;
+        if !is_old && are_of_one_plane(&one.scan, scan) {
             same_plane.push(&one.result);
         }
     }
     let last = same_plane.last()?;
-    let time_s = Some(scan.map.middle_s()).filter(|time_s| time_s.is_finite())?;
     let core_m = last.wake.map_or(2.0, |wake| wake.left.core_radius_m);
     let track = retrieve::track_of(same_plane.iter().copied());
     track.ok()??.prediction(time_s, core_m)

@@ -23,6 +23,10 @@ use crate::vortex_fit::{PARAMETERS, Secondary, Vortex, Wake, WakeModel};
 /// its height.
 const RATIOS: (f64, f64) = (-0.8, -0.05);
 const DISTANCES: (f64, f64) = (0.25, 1.5);
+/// Least distance in the end: two vortices nearer than that are parts of one.
+const LEAST_DISTANCE: f64 = 0.4;
+/// Heights, over the spacing of the pair, above which a vortex has drawn nothing up from the ground, also after it has rebounded.
+const HIGHEST: f64 = 1.5;
 /// Distance of the places of the search over the height of the vortex.
 const GRID_OVER_HEIGHT: f64 = 0.12;
 /// Least gain of the logarithm of the likelihood by both, with velocities that say the same counted once: in the end by what is alike in the residuals
@@ -60,9 +64,13 @@ struct Residuals<'a> {
     step: Array1<f64>,
 }
 
-/// Whether a secondary vortex may be that far from its vortex, over the height of the latter.
-fn is_near(distance: f64) -> bool {
-    (DISTANCES.0..=DISTANCES.1).contains(&distance)
+/// Whether a secondary vortex is nearer to its own one than to the other: else it may stand for a part of the other, which turns as it does.
+fn is_beside(secondary: &Vortex, own: &Vortex, other: &Vortex) -> bool {
+    distance_m(secondary, own) < distance_m(secondary, other)
+}
+
+fn distance_m(a: &Vortex, b: &Vortex) -> f64 {
+    (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m)
 }
 
 /// Every `step`th place of the grid in a square about one of them.
@@ -120,23 +128,28 @@ impl Setting<'_, '_> {
     fn found(&self, settled: &Linear, gain: f64) -> Option<SecondaryVortices> {
         let p = &settled.at;
         // one far from its vortex stands for something else; a little beyond the scan it may be
-        let are_near = secondary_ratios(p)
-            .into_iter()
-            .all(|(ratio, distance)| (RATIOS.0..0.0).contains(&ratio) && is_near(distance));
-        let shown = gain >= LEAST_GAIN && are_near;
+        let are_near = secondary_ratios(p).into_iter().all(|(ratio, distance)| {
+            (RATIOS.0..0.0).contains(&ratio) && (LEAST_DISTANCE..=DISTANCES.1).contains(&distance)
+        });
+        let (model, wake) = self.model.with(p);
+        let vortices = model.secondary?;
+        let are_beside = is_beside(&vortices[0], &wake.left, &wake.right)
+            && is_beside(&vortices[1], &wake.right, &wake.left);
+        let highest_m = HIGHEST * wake.spacing_m();
+        let are_low = wake.left.height_m.max(wake.right.height_m) < highest_m;
+        let shown = gain >= LEAST_GAIN && are_near && are_beside && are_low;
         let always = self.options.secondary == Secondary::Always;
         let fitted = always || shown && self.options.secondary == Secondary::Auto;
         if !shown && !fitted {
             return None;
         }
-        let (model, wake) = self.model.with(p);
         let scores = Scores::OfNeighbours {
             lines: self.options.correlated_lines,
         };
         let squares = self.about(settled);
         let uncertainty = squares.uncertainty(p, &settled.groups, scores).ok()?;
         Some(SecondaryVortices {
-            vortices: model.secondary?,
+            vortices,
             shown,
             fitted,
             wake,
@@ -222,7 +235,10 @@ impl Setting<'_, '_> {
         );
         let vortex = Vortex::at(place_m, 1.0, KNOWN_CORE.0 * own.height_m);
         let distance = GRID_OVER_HEIGHT * (i as f64).hypot(j as f64);
-        if !is_near(distance) || vortex.height_m <= 0.0 || !self.sees(&vortex) {
+        if !(DISTANCES.0..=DISTANCES.1).contains(&distance)
+            || vortex.height_m <= 0.0
+            || !self.sees(&vortex)
+        {
             return None;
         }
         let plain = WakeModel {
