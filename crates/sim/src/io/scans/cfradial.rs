@@ -5,7 +5,7 @@
 //! files without Nyquist velocity, with ragged gates, another sign, several sweeps.
 
 use super::gate_layout::GateLayout;
-use super::grid::{RayRow, mean_count, of_mean, scan_map};
+use super::grid::{mean_count, of_mean, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::netcdf_input::{NetcdfFile, quoted};
@@ -59,9 +59,8 @@ pub(super) fn scans(
         let number = number + sweep;
         let what = format!("sweep {number}");
         let known: Vec<usize> = range.filter(|ray| rays.is_still[*ray]).collect();
-        for (fold_m_s, own) in by_fold(&known, &rays.fold_m_s) {
-            let rows: Vec<RayRow> = own.iter().map(|ray| rays.rows[*ray].clone()).collect();
-            let (scans, skipped) = match planes::in_order(rows) {
+        for (fold_m_s, own) in by_fold(&known, &rays.rows) {
+            let (scans, skipped) = match planes::in_order(own) {
                 Ok(split) => split,
                 Err(reason) => {
                     found.skipped.push(format!("{what}: {reason}"));
@@ -112,16 +111,9 @@ pub(super) fn rays(
     for (number, range) in rays.sweeps.into_iter().enumerate() {
         let mut own = Vec::with_capacity(range.len());
         for ray in range.filter(|ray| rays.is_still[*ray]) {
-            let row = &rays.rows[ray];
-            let fold_m_s = rays.fold_m_s[ray];
             own.push(Ray {
-                azimuth_rad: row.azimuth_rad,
-                elevation_rad: row.elevation_rad,
-                time_s: row.time_s,
                 range_m: ranges_m[ray.min(ranges_m.len() - 1)].clone(),
-                velocity_m_s: row.velocity_m_s.clone(),
-                sigma_m_s: row.sigma_m_s.clone(),
-                fold_m_s: (fold_m_s > 0.0 && fold_m_s.is_finite()).then_some(fold_m_s),
+                ..rays.rows[ray].clone()
             });
         }
         sweeps.push(RaySweep {
@@ -224,7 +216,7 @@ fn elevations_rad(file: &NetcdfFile) -> Result<Vec<f64>, String> {
 }
 
 /// Turns ranges that fall from gate to gate round, with the velocities along them.
-fn turn_falling(range_m: &mut [f64], rows: &mut [RayRow]) {
+fn turn_falling(range_m: &mut [f64], rows: &mut [Ray]) {
     if range_m.len() < 2 || range_m.windows(2).any(|pair| pair[1] >= pair[0]) {
         return;
     }
@@ -237,11 +229,9 @@ fn turn_falling(range_m: &mut [f64], rows: &mut [RayRow]) {
 
 /// The rays of a file.
 struct Rays {
-    rows: Vec<RayRow>,
+    rows: Vec<Ray>,
     /// Whether the head did not move to another place during a ray.
     is_still: Vec<bool>,
-    /// Multiples of which velocities may lack, m/s, for each ray; NaN of none.
-    fold_m_s: Vec<f64>,
     sweeps: Vec<std::ops::Range<usize>>,
     /// The date from which times count.
     reference: Option<UtcTime>,
@@ -284,25 +274,24 @@ impl Rays {
         let nyquist_m_s = nyquist_m_s.filter(|_| !is_mirrored);
         let mut rows = Vec::with_capacity(count);
         let mut is_still = Vec::with_capacity(count);
-        let mut fold_m_s = Vec::with_capacity(count);
         for ray in 0..count {
             let cells = ray * gates..(ray + 1) * gates;
             let sigma_m_s = sigma_m_s.as_ref().map(|all| all[cells.clone()].to_vec());
-            rows.push(RayRow {
+            let fold_m_s = nyquist_m_s.as_ref().map(|all| 2.0 * all[ray]);
+            rows.push(Ray {
                 elevation_rad: elevation_rad[ray],
                 azimuth_rad: azimuth_rad[ray],
                 time_s: times.time_s[ray],
                 velocity_m_s: velocity_m_s[cells].to_vec(),
                 sigma_m_s: sigma_m_s.unwrap_or_default(),
+                fold_m_s: fold_m_s.filter(|fold| *fold > 0.0 && fold.is_finite()),
+                ..Ray::default()
             });
             is_still.push(moving.as_ref().is_none_or(|moves| moves[ray] != 1.0));
-            let nyquist_m_s = nyquist_m_s.as_ref().map_or(f64::NAN, |all| all[ray]);
-            fold_m_s.push(2.0 * nyquist_m_s);
         }
         Ok(Self {
             rows,
             is_still,
-            fold_m_s,
             sweeps,
             reference: times.reference,
             scans: mean_count(counts.iter().flatten().copied()),
@@ -329,14 +318,17 @@ fn ray_values(
     }
 }
 
-/// Rays in groups of one Nyquist velocity, with the multiple of which their velocities may lack: its double, if it is known.
-fn by_fold(rays: &[usize], fold_m_s: &[f64]) -> Vec<(Option<f64>, Vec<usize>)> {
-    let mut groups: Vec<(Option<f64>, Vec<usize>)> = Vec::new();
-    for ray in rays {
-        let own = Some(fold_m_s[*ray]).filter(|fold| *fold > 0.0 && fold.is_finite());
-        match groups.iter_mut().find(|(fold, _)| is_one_fold(*fold, own)) {
-            Some((_, group)) => group.push(*ray),
-            None => groups.push((own, vec![*ray])),
+/// Rays of some numbers in groups of one Nyquist velocity, with the multiple of which their velocities may lack: its double, if it is known.
+fn by_fold(numbers: &[usize], rays: &[Ray]) -> Vec<(Option<f64>, Vec<Ray>)> {
+    let mut groups: Vec<(Option<f64>, Vec<Ray>)> = Vec::new();
+    for number in numbers {
+        let ray = rays[*number].clone();
+        match groups
+            .iter_mut()
+            .find(|(fold, _)| is_one_fold(*fold, ray.fold_m_s))
+        {
+            Some((_, group)) => group.push(ray),
+            None => groups.push((ray.fold_m_s, vec![ray])),
         }
     }
     groups

@@ -30,7 +30,7 @@ pub struct Ray {
     pub elevation_rad: f64,
     /// Time of its middle, s; NaN if it is unknown.
     pub time_s: f64,
-    /// Ranges of its gates, m.
+    /// Ranges of its gates, m; empty while all rays of the file have the same.
     pub range_m: Vec<f64>,
     /// Velocities of its gates, m/s, positive away; NaN where there is none.
     pub velocity_m_s: Vec<f64>,
