@@ -37,7 +37,7 @@ pub(super) fn scans(
     sweep: usize,
 ) -> Result<Found, String> {
     let mut range_m = ranges(file)?;
-    let velocity = VelocityVariable::new(file, format)?;
+    let velocity = velocity_name(file, format)?;
     let mut rays = Rays::read(file, format, &velocity, range_m.len())?;
     turn_falling(&mut range_m, &mut rays.rows);
     if let Some(text) = rays.rounded {
@@ -98,7 +98,7 @@ pub(super) fn rays(
     sweep: usize,
 ) -> Result<FoundRays, String> {
     let mut ranges_m = ray_ranges(file, elevations_rad(file)?.len())?;
-    let velocity = VelocityVariable::new(file, format)?;
+    let velocity = velocity_name(file, format)?;
     let gates = ranges_m.first().map_or(0, Vec::len);
     let mut rays = Rays::read(file, format, &velocity, gates)?;
     if let [common_m] = &mut ranges_m[..] {
@@ -134,10 +134,10 @@ pub(super) fn rays(
 }
 
 /// The scene of a file of this program, whole or what other programs left of it.
-fn scene_of<'f>(file: &'f NetcdfFile, velocity: &VelocityVariable) -> Option<&'f str> {
+fn scene_of<'f>(file: &'f NetcdfFile, velocity: &str) -> Option<&'f str> {
     file.global_text("scene")
-        .or_else(|| file.text(&velocity.name, "scene"))
-        .or_else(|| file.text(&velocity.name, "instrument"))
+        .or_else(|| file.text(velocity, "scene"))
+        .or_else(|| file.text(velocity, "instrument"))
         .filter(|text| !text.is_empty())
 }
 
@@ -246,7 +246,7 @@ impl Rays {
     fn read(
         file: &NetcdfFile,
         format: &ScanFormat,
-        velocity: &VelocityVariable,
+        velocity: &str,
         gates: usize,
     ) -> Result<Self, String> {
         let elevation_rad = elevations_rad(file)?;
@@ -260,11 +260,12 @@ impl Rays {
             None => None,
         };
         let times = times(file, count)?;
-        let layout = GateLayout::new(file, &velocity.name, [count, gates])?;
+        let layout = GateLayout::new(file, velocity, [count, gates])?;
         let velocity_m_s = velocities_m_s(format, velocity, &layout)?;
-        let counts = match velocity.is_mean {
-            true => layout.optional("count")?,
-            false => None,
+        // The velocity may be the mean of several scans.
+        let counts = match file.text(velocity, "cell_methods") {
+            Some(methods) if methods.contains("realization: mean") => layout.optional("count")?,
+            _ => None,
         };
         let sigma_m_s = sigmas_m_s(&layout, counts.as_deref())?;
         // Mirrored velocities are no multiple away from those of the air.
@@ -345,13 +346,13 @@ fn is_one_fold(fold_m_s: Option<f64>, other_m_s: Option<f64>) -> bool {
 /// flags them.
 fn velocities_m_s(
     format: &ScanFormat,
-    velocity: &VelocityVariable,
+    velocity: &str,
     layout: &GateLayout,
 ) -> Result<Vec<f64>, String> {
     let file = layout.file;
     let mut velocity_m_s = layout.spread(
-        &velocity.name,
-        variable::values(file, &velocity.name, Quantity::Velocity)?,
+        velocity,
+        variable::values(file, velocity, Quantity::Velocity)?,
     )?;
     let status_of = |name: &str| match format.ignores_status {
         true => Ok(None),
@@ -369,6 +370,11 @@ fn velocities_m_s(
         (Some(_), Some(name)) => Some(layout.spread(name, variable::ratio_db(file, name)?)?),
         (Some(_), None) => return Err(super::NO_RATIO.to_owned()),
     };
+    let sign = if variable::is_towards(file, velocity) {
+        -1.0
+    } else {
+        format.sign()
+    };
     for (at, value) in velocity_m_s.iter_mut().enumerate() {
         let is_noise = ratio_db
             .as_ref()
@@ -377,11 +383,7 @@ fn velocities_m_s(
             || status
                 .as_ref()
                 .is_some_and(|status| !trusted.contains(&status[at]));
-        *value = if is_noise {
-            f64::NAN
-        } else {
-            velocity.sign * *value
-        };
+        *value = if is_noise { f64::NAN } else { sign * *value };
     }
     Ok(velocity_m_s)
 }
@@ -424,42 +426,24 @@ fn sigmas_m_s(layout: &GateLayout, counts: Option<&[f64]>) -> Result<Option<Vec<
     Ok(Some(sigma_m_s))
 }
 
-/// The variable that holds the velocities.
-struct VelocityVariable {
-    name: String,
-    /// 1 for velocities that are positive away from the lidar.
-    sign: f64,
-    /// Whether it is the mean of several scans.
-    is_mean: bool,
-}
-
-impl VelocityVariable {
-    fn new(file: &NetcdfFile, format: &ScanFormat) -> Result<Self, String> {
-        let name = match &format.field {
-            Some(name) if file.has(name) => {
-                variable::refuse_other_than_velocity(file, name)?;
-                name.clone()
-            }
-            Some(name) => return Err(format!("it has no variable {name}, which --field names")),
-            None => variable::find(file, &VELOCITY)
-                .map(str::to_owned)
-                .ok_or_else(|| no_velocity(file))?,
-        };
-        if format.towards && variable::is_away(file, &name) {
-            return Err(format!(
-                "--towards: the standard name of its variable {name} says that velocities are positive away from the lidar"
-            ));
+/// The name of the variable that holds the velocities.
+fn velocity_name(file: &NetcdfFile, format: &ScanFormat) -> Result<String, String> {
+    let name = match &format.field {
+        Some(name) if file.has(name) => {
+            variable::refuse_other_than_velocity(file, name)?;
+            name.clone()
         }
-        let is_towards = variable::is_towards(file, &name) || format.towards;
-        let is_mean = file
-            .text(&name, "cell_methods")
-            .is_some_and(|methods| methods.contains("realization: mean"));
-        Ok(Self {
-            name,
-            sign: if is_towards { -1.0 } else { 1.0 },
-            is_mean,
-        })
+        Some(name) => return Err(format!("it has no variable {name}, which --field names")),
+        None => variable::find(file, &VELOCITY)
+            .map(str::to_owned)
+            .ok_or_else(|| no_velocity(file))?,
+    };
+    if format.towards && variable::is_away(file, &name) {
+        return Err(format!(
+            "--towards: the standard name of its variable {name} says that velocities are positive away from the lidar"
+        ));
     }
+    Ok(name)
 }
 
 /// What is said of a file without a variable of velocities, or with one of a type that is not read.
