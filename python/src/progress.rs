@@ -30,12 +30,7 @@ struct Running {
     steps: u64,
     done: u64,
     text: String,
-}
-
-/// Stages that run, each a part of the one before it, and when was told of them last.
-#[derive(Default)]
-struct State {
-    running: Vec<Running>,
+    /// When was told of it last.
     told: Option<Instant>,
 }
 
@@ -43,7 +38,8 @@ struct State {
 pub(crate) struct Teller {
     events: Mutex<Sender<Event>>,
     stopped: Arc<AtomicBool>,
-    state: Mutex<State>,
+    /// Stages that run, each a part of the one before it.
+    running: Mutex<Vec<Running>>,
 }
 
 impl Teller {
@@ -51,7 +47,7 @@ impl Teller {
         Self {
             events: Mutex::new(events),
             stopped,
-            state: Mutex::default(),
+            running: Mutex::default(),
         }
     }
 
@@ -69,12 +65,12 @@ impl Teller {
         if self.stopped.load(Ordering::Relaxed) {
             stop();
         }
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        change(&mut state.running);
-        let Some(first) = state.running.first() else {
+        let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
+        change(&mut running);
+        let Some(first) = running.first_mut() else {
             return;
         };
-        if seldom && state.told.is_some_and(|told| told.elapsed() < SELDOM) {
+        if seldom && first.told.is_some_and(|told| told.elapsed() < SELDOM) {
             return;
         }
         let part = if first.steps == 0 {
@@ -87,7 +83,7 @@ impl Teller {
             part,
             text: first.text.clone(),
         });
-        state.told = Some(Instant::now());
+        first.told = Some(Instant::now());
     }
 }
 
@@ -99,6 +95,7 @@ impl Observer for Teller {
                 steps,
                 done: 0,
                 text: String::new(),
+                told: None,
             })
         });
     }

@@ -33,13 +33,8 @@ use wakescope_sim::write_contents;
 const LARGEST_FILE: usize = 100_000;
 const LARGEST_SET: usize = 2_000_000;
 
-/// A file of the set, and the number of its case.
-struct SetFile {
-    name: String,
-    format: &'static str,
-    case: u32,
-    bytes: Vec<u8>,
-}
+/// Contents of files by the numbers of their cases and their names.
+type Contents = BTreeMap<(u32, String), Vec<u8>>;
 
 /// Writes the set to a folder.
 pub(crate) fn run(out: &Path, overwrite: bool) -> Outcome {
@@ -55,24 +50,23 @@ pub(crate) fn run(out: &Path, overwrite: bool) -> Outcome {
 fn files() -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let cases = Cases::read()?;
     let folder = tempfile::tempdir()?;
-    let made: Vec<Result<Vec<SetFile>, Failure>> = cases
+    let made: Vec<Result<Contents, Failure>> = cases
         .scan
         .par_iter()
         .map(|case| files_of_scan(&cases, case, folder.path()))
         .collect();
-    let mut files = Vec::new();
+    let mut files = Contents::new();
     for of_scan in made {
         files.extend(of_scan?);
     }
-    files.sort_by(|a, b| (a.case, &a.name).cmp(&(b.case, &b.name)));
     let mut contents = vec![
-        ("manifest.csv".to_owned(), manifest(&files).into_bytes()),
+        ("manifest.csv".to_owned(), manifest(&files)?.into_bytes()),
         (
             "README.md".to_owned(),
             include_bytes!("conformance/README.md").to_vec(),
         ),
     ];
-    contents.extend(files.into_iter().map(|file| (file.name, file.bytes)));
+    contents.extend(files.into_iter().map(|((_, name), bytes)| (name, bytes)));
     check_sizes(&contents)?;
     Ok(contents)
 }
@@ -95,28 +89,26 @@ fn check_sizes(files: &[(String, Vec<u8>)]) -> Outcome {
 }
 
 /// The list of the files.
-fn manifest(files: &[SetFile]) -> String {
+fn manifest(files: &Contents) -> Result<String, Failure> {
     let mut out = String::from("file,format,case,bytes,sha256\n");
-    for file in files {
-        let name = &file.name;
-        let format = file.format;
-        let case = file.case;
+    for ((case, name), bytes) in files {
+        let format = format_of(name)?;
         // Writing to a text cannot fail.
-        let _ = write!(out, "{name},{format},{case},{},", file.bytes.len());
-        for byte in Sha256::digest(&file.bytes) {
+        let _ = write!(out, "{name},{format},{case},{},", bytes.len());
+        for byte in Sha256::digest(bytes) {
             let _ = write!(out, "{byte:02x}");
         }
         out.push('\n');
     }
-    out
+    Ok(out)
 }
 
 /// The files of a scan, with what is true of them.
-fn files_of_scan(cases: &Cases, case: &ScanCase, folder: &Path) -> Result<Vec<SetFile>, Failure> {
+fn files_of_scan(cases: &Cases, case: &ScanCase, folder: &Path) -> Result<Contents, Failure> {
     let scene = cases.scene(case, folder)?;
     let plan = wakescope_sim::Plan::new(scene, wakescope_sim::Target::Map)?;
     let scan = Scan::new(plan, case)?;
-    let mut files = Vec::new();
+    let mut files = Contents::new();
     // By the name of the truth, the files that share it with their cases, and their first and last ray.
     let mut truths: BTreeMap<String, BTreeMap<String, u32>> = BTreeMap::new();
     let mut rays_by_truth = BTreeMap::new();
@@ -128,13 +120,7 @@ fn files_of_scan(cases: &Cases, case: &ScanCase, folder: &Path) -> Result<Vec<Se
         };
         for turn in 0..turns {
             let name = name.replace('N', &(turn + 1).to_string());
-            let mut file = SetFile {
-                format: format_of(&name)?,
-                case: *number,
-                bytes: Vec::new(),
-                name: name.clone(),
-            };
-            file.bytes = match &case.cut {
+            let bytes = match &case.cut {
                 Some(Cut::Bytes { of, kept }) if *of != name && name.contains("cut") => {
                     let whole = content(&scan, case, of, turn)?;
                     whole[..(kept * whole.len() as f64) as usize].to_vec()
@@ -148,8 +134,11 @@ fn files_of_scan(cases: &Cases, case: &ScanCase, folder: &Path) -> Result<Vec<Se
             rays_by_truth
                 .entry(stem.clone())
                 .or_insert_with(|| rays_of_turn(&scan, turn, turns));
-            truths.entry(stem).or_default().insert(name, *number);
-            files.push(file);
+            truths
+                .entry(stem)
+                .or_default()
+                .insert(name.clone(), *number);
+            files.insert((*number, name), bytes);
         }
     }
     for (stem, of_truth) in truths {
@@ -163,12 +152,8 @@ fn files_of_scan(cases: &Cases, case: &ScanCase, folder: &Path) -> Result<Vec<Se
         let json = truth::json_text(&scan, rays, gates_before, &json!(of_truth))?;
         let csv = truth::csv(&scan, rays, gates_before);
         for (ending, text) in [("json", json), ("csv", csv)] {
-            files.push(SetFile {
-                name: format!("{stem}.truth.{ending}"),
-                format: "truth",
-                case,
-                bytes: text.into_bytes(),
-            });
+            let name = format!("{stem}.truth.{ending}");
+            files.insert((case, name), text.into_bytes());
         }
     }
     Ok(files)
@@ -184,6 +169,8 @@ fn truth_stem(name: &str) -> &str {
 
 fn format_of(name: &str) -> Result<&'static str, Failure> {
     let endings = [
+        (".truth.json", "truth"),
+        (".truth.csv", "truth"),
         (".cf2.nc", "CfRadial 2"),
         (".wc.nc", "WindCube"),
         (".nc", "CfRadial 1.4"),

@@ -11,8 +11,11 @@ use crate::figures::context::{Comparison, Context, Rendered};
 use crate::figures::{Figure, filled};
 use crate::profile::Profile;
 use crate::statistics::{Bar, Estimate, NO_DIFFERENCE, Verdict};
-use elements::{Picture, badge, folded, table, typeset};
+use elements::{
+    badge, drawing, folded, table, table_of_csv, thumbnail_of_csv, thumbnail_of_drawing, typeset,
+};
 use fixtures::failure::Failure;
+use std::borrow::Cow;
 use std::fmt;
 use wakescope_sim::plot::escape;
 
@@ -150,23 +153,20 @@ fn shortfalls(claims: &[&Claim], profile: Profile) -> String {
     paragraphs
 }
 
-/// The picture of a figure; its table where it has none.
-fn picture<'r>(figure: &Figure, rendered: &'r Rendered) -> Result<Picture<'r>, Failure> {
-    match rendered.file("svg") {
-        Some(svg) => Picture::new(figure.id, std::str::from_utf8(svg)?),
-        None => Ok(Picture::Rows {
-            id: figure.id,
-            csv: String::from_utf8_lossy(rendered.file("csv").unwrap_or_default()),
-        }),
-    }
+/// The table of a figure as CSV.
+fn csv_of(rendered: &Rendered) -> Cow<'_, str> {
+    String::from_utf8_lossy(rendered.file("csv").unwrap_or_default())
 }
 
 /// A small picture of each figure, which leads to it.
 fn thumbnails(done: &Done<'_>) -> Result<String, Failure> {
     let mut list = String::new();
     for (figure, rendered) in done {
-        let small = picture(figure, rendered)?.thumbnail(figure.row);
         let id = figure.id;
+        let small = match rendered.file("svg") {
+            Some(svg) => thumbnail_of_drawing(id, std::str::from_utf8(svg)?, figure.row)?,
+            None => thumbnail_of_csv(&csv_of(rendered)),
+        };
         let number = escape(&figure.numbered());
         let title = typeset(figure.title);
         list += &format!(
@@ -176,10 +176,10 @@ fn thumbnails(done: &Done<'_>) -> Result<String, Failure> {
     Ok(list)
 }
 
-/// All figures with their captions.
+/// All figures, or their tables where they have no picture, with their captions.
 ///
 /// # Errors
-/// Fails if two have one id, or a picture is not as [`Picture::new`] needs it.
+/// Fails if two have one id, or a picture is not as [`drawing`] needs it.
 fn figures(done: &Done<'_>) -> Result<String, Failure> {
     let mut figures = String::new();
     let mut ids = Vec::new();
@@ -196,7 +196,10 @@ fn figures(done: &Done<'_>) -> Result<String, Failure> {
             marks += &format!(" <span class=\"mark\">{}</span>", escape(mark));
         }
         let heading = figure.heading();
-        let content = picture(figure, rendered)?.full(&heading)?;
+        let content = match rendered.file("svg") {
+            Some(svg) => drawing(id, std::str::from_utf8(svg)?, &heading)?,
+            None => table_of_csv(id, &csv_of(rendered))?,
+        };
         figures += &format!(
             "<figure id=\"{id}\">\n<h3>{}{marks}</h3>\n{content}<figcaption>{}</figcaption>\n</figure>\n",
             typeset(&heading),

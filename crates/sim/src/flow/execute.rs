@@ -4,10 +4,10 @@
 
 use super::files::{Files, agree, checkpoint_paths};
 use super::forecast::{FlowForecast, refuse_too_large};
-use super::setup::{Setup, WakeSetup};
-use super::wake::{WakeRun, plain_schedule, wake_schedule};
+use super::setup::Setup;
+use super::wake::{age_tau, plain_schedule, wake_schedule};
 use super::writer::{DIVISIONS, Writer, growth_note};
-use super::{Begin, CaseFile, FlowCase, FlowOutcome, age_tau};
+use super::{Begin, CaseFile, FlowCase, FlowOutcome};
 use crate::io::Existing;
 use crate::io::lock::FolderLock;
 use crate::keys::Problem;
@@ -117,7 +117,7 @@ pub fn run_on(
         ranks: ranks.clone(),
         files,
         steps: None,
-        wake: wake.map(|wake| WakeRun::new(wake, run.flow())),
+        wake,
         written: Vec::new(),
         warnings,
         observer,
@@ -349,8 +349,9 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
     let end_s = end_s(file, setup)?;
     let mut output = case.output.clone();
     let schedule = match (&case.wake, &setup.wake) {
-        (Some(wake), Some(WakeSetup { scales, .. })) => {
-            output.planes_x_m = wake.planes_x.iter().map(|x| x * scales.spacing_m).collect();
+        (Some(wake), Some(history)) => {
+            let spacing_m = history.scales.spacing_m;
+            output.planes_x_m = wake.planes_x.iter().map(|x| x * spacing_m).collect();
             wake_schedule(wake, setup.tau_per_s, end_s)
         }
         _ => plain_schedule(

@@ -267,7 +267,7 @@ impl Files {
         }
         Ok(CrossPlanes {
             title: format!("{}, plane at x = {x_m} m", self.title),
-            tau: vec![super::age_tau(flow.time_s(), self.tau_per_s)],
+            tau: vec![wake::age_tau(flow.time_s(), self.tau_per_s)],
             time_s: vec![flow.time_s()],
             v_m_s: in_one_plane(shape, v_m_s),
             w_m_s: in_one_plane(shape, w_m_s),

@@ -8,7 +8,8 @@
 
 use super::case::{FlowCase, Subgrid};
 use super::files::{FileForecast, Files};
-use super::setup::{Setup, WakeSetup};
+use super::setup::Setup;
+use super::wake::WakeHistory;
 use super::{CaseFile, CaseKind, InitialName, WakeOutput};
 use crate::keys::Declared as _;
 use crate::quantities::{bytes, rounded, seconds};
@@ -228,7 +229,7 @@ fn steps_to(end_s: f64, first_s: f64, setup: &Setup) -> f64 {
 }
 
 /// Largest speed of the air of a pair at a time over the speed of its descent.
-fn core_speed(wake: &WakeSetup, viscosity_m2_s: f64, time_s: f64) -> f64 {
+fn core_speed(wake: &WakeHistory, viscosity_m2_s: f64, time_s: f64) -> f64 {
     let radius_m = (wake.core_radius_m.powi(2) + 4.0 * viscosity_m2_s * time_s).sqrt();
     1.0 + 0.5 * wake.scales.spacing_m / radius_m
 }

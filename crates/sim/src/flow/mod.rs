@@ -135,11 +135,6 @@ impl CaseFile {
     }
 }
 
-/// Age of a wake at a time, without the last digits, in which it may differ from the requested age.
-fn age_tau(time_s: f64, tau_per_s: f64) -> f64 {
-    crate::quantities::rounded(time_s * tau_per_s, 13)
-}
-
 /// Whether a run begins or continues.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Begin {

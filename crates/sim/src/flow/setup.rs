@@ -1,7 +1,7 @@
 //! All that a simulation is made of: mesh, settings, initial field, and its start.
 
+use super::wake::WakeHistory;
 use crate::Error;
-use wakescope_les::analysis::{WakeMeter, WakeScales};
 pub(super) use wakescope_les::cases::Initial;
 use wakescope_les::solver::{Stability, UndampedGrowth};
 use wakescope_les::{Flow, FlowSettings, Mesh};
@@ -15,20 +15,10 @@ pub(super) struct Setup {
     pub(super) end_s: Option<f64>,
     /// Age of the wake per time \[1/s\]; 1 where there is no wake.
     pub(super) tau_per_s: f64,
-    /// What a wake is measured by.
-    pub(super) wake: Option<WakeSetup>,
+    /// What a wake is measured by, still without a record.
+    pub(super) wake: Option<WakeHistory>,
     /// Waves for which Runge-Kutta was taken in place of Adams-Bashforth.
     pub(super) undamped: Option<UndampedGrowth>,
-}
-
-/// The meter of a wake and its scales.
-pub(super) struct WakeSetup {
-    pub(super) meter: WakeMeter,
-    /// Radii between which the circulation is averaged \[m\].
-    pub(super) circulation_radii_m: [f64; 2],
-    pub(super) scales: WakeScales,
-    /// Core radius at the start \[m\].
-    pub(super) core_radius_m: f64,
 }
 
 impl Setup {

@@ -7,7 +7,7 @@
 
 use super::CaseFile;
 use super::files::{CASE, Files, STEPS, agree};
-use super::wake::{HISTORIES, WakeRun};
+use super::wake::{HISTORIES, WakeHistory};
 use crate::Error;
 use crate::io::csv::float_text;
 use crate::io::{Provenance, write_atomic};
@@ -41,7 +41,7 @@ pub(super) struct Writer<'a> {
     pub(super) ranks: Arc<dyn Ranks>,
     pub(super) files: Files,
     pub(super) steps: Option<StepTable>,
-    pub(super) wake: Option<WakeRun>,
+    pub(super) wake: Option<WakeHistory>,
     pub(super) written: Vec<PathBuf>,
     pub(super) warnings: Vec<String>,
     pub(super) observer: &'a dyn Observer,

@@ -8,7 +8,7 @@ use crate::io::edges;
 use crate::io::netcdf_dimensions::{Role, TIME, X, Y, Z};
 use crate::io::netcdf_input::{NetcdfFile, open};
 use crate::io::{UtcTime, variable};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use wakescope_les::winds::{Edges, VolumeComponent};
 
 /// Acceleration of gravity by which WRF makes heights of its geopotential, m/s^2.
@@ -17,39 +17,18 @@ const WRF_GRAVITY_M_S2: f64 = 9.81;
 /// Heights of a level may differ by so much of the highest over a field, if it is to count as level.
 const LEVEL: f64 = 2e-3;
 
-/// One field of a file.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct FieldPlace {
-    /// The file.
-    pub(crate) path: PathBuf,
-    /// Its place along the time, if the file has such a dimension.
-    pub(crate) place: Option<usize>,
-    /// Its time in s after `reference`, or in the unit that the file leaves unnamed.
-    pub(crate) time_s: f64,
-    /// The date from which times of the file count, if it has one.
-    pub(crate) reference: Option<UtcTime>,
-}
+/// The place of each field along the time, if the file has such a dimension, and its time in s or in the unit that the file leaves
+/// unnamed; and the date from which these count, if it has one.
+type FieldTimes = (Vec<(Option<usize>, f64)>, Option<UtcTime>);
 
 /// The fields of a file, in the order of their times.
 ///
 /// # Errors
 /// A file that cannot be read or lacks the variable `name`; a time without values.
-pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> {
+pub(crate) fn places(path: &Path, name: &str) -> Result<FieldTimes, Error> {
     let file = open(path)?;
-    let (times, reference) = times(&file, name).map_err(|reason| file.refuse(reason))?;
-    Ok(times
-        .into_iter()
-        .map(|(place, time_s)| FieldPlace {
-            path: path.to_owned(),
-            place,
-            time_s,
-            reference,
-        })
-        .collect())
+    times(&file, name).map_err(|reason| file.refuse(reason))
 }
-
-/// The place of each field along the time, and its time; and the date from which these count.
-type FieldTimes = (Vec<(Option<usize>, f64)>, Option<UtcTime>);
 
 fn times(file: &NetcdfFile, name: &str) -> Result<FieldTimes, String> {
     let Some(dim) = file.dim_of(name, TIME) else {
@@ -119,11 +98,15 @@ fn wrf_times(file: &NetcdfFile) -> Result<(Vec<f64>, Option<UtcTime>), String> {
 ///
 /// # Errors
 /// A variable or a coordinate that is missing, a value that is missing, levels that are not level.
-pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<Components, Error> {
-    let file = open(&field.path)?;
+pub(crate) fn read(
+    path: &Path,
+    place: Option<usize>,
+    names: &[String; 3],
+) -> Result<Components, Error> {
+    let file = open(path)?;
     let mut components = Vec::with_capacity(names.len());
     for name in names {
-        let component = component(&file, name, field, true);
+        let component = component(&file, name, place, true);
         components.push(component.map_err(|reason| file.refuse(reason))?);
     }
     let [u, v, w] = components
@@ -150,9 +133,13 @@ type Components = ([VolumeComponent; 3], [Option<f64>; 2]);
 /// # Errors
 /// As [`read`]; a negative value.
 #[cfg(any(feature = "plots", test))]
-pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeComponent, Error> {
-    let file = open(&field.path)?;
-    let scalar = component(&file, name, field, false).map_err(|reason| file.refuse(reason))?;
+pub(crate) fn read_scalar(
+    path: &Path,
+    place: Option<usize>,
+    name: &str,
+) -> Result<VolumeComponent, Error> {
+    let file = open(path)?;
+    let scalar = component(&file, name, place, false).map_err(|reason| file.refuse(reason))?;
     if let Some((at, value)) = scalar
         .values
         .iter()
@@ -169,10 +156,9 @@ pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeCompon
 fn component(
     file: &NetcdfFile,
     name: &str,
-    field: &FieldPlace,
+    place: Option<usize>,
     is_velocity: bool,
 ) -> Result<VolumeComponent, String> {
-    let place = field.place;
     let dims = match place {
         Some(_) => file
             .roles(name, [TIME, Z, Y, X])
@@ -316,9 +302,10 @@ mod tests {
                 .unwrap(),
         )
         .unwrap();
-        let place = places(&path, "u").unwrap().remove(0);
-        assert_eq!(place.time_s, 43_200.0);
-        for component in read(&place, &["u", "v", "w"].map(str::to_owned)).unwrap().0 {
+        let (times, _) = places(&path, "u").unwrap();
+        assert_eq!(times, [(Some(0), 43_200.0)]);
+        let names = ["u", "v", "w"].map(str::to_owned);
+        for component in read(&path, Some(0), &names).unwrap().0 {
             assert!(
                 component
                     .values
@@ -336,7 +323,8 @@ mod tests {
             );
         }
         // What the air carries keeps its own unit, which the scene scales.
-        assert_eq!(read_scalar(&place, "beta").unwrap().values, vec![2.0; 64]);
+        let beta = read_scalar(&path, Some(0), "beta").unwrap();
+        assert_eq!(beta.values, vec![2.0; 64]);
     }
 
     /// Writes a file of one field of components that are 1 more at each node, upwards, than at the one below.
@@ -376,9 +364,10 @@ mod tests {
             let time = Variable::new("time", &["time"], Data::f64([10.0]));
             let time = time.text("units", "seconds since start");
             staggered(&path, names, vec![time]);
-            let place = places(&path, "u").unwrap().remove(0);
-            assert_eq!((place.time_s, place.reference), (10.0, None));
-            for component in read(&place, &["u", "v", "w"].map(str::to_owned)).unwrap().0 {
+            let found = places(&path, "u").unwrap();
+            assert_eq!(found, (vec![(Some(0), 10.0)], None));
+            let components = ["u", "v", "w"].map(str::to_owned);
+            for component in read(&path, Some(0), &components).unwrap().0 {
                 assert!(component.nodes_m.iter().all(|nodes| nodes[3] == 3.0));
                 assert_eq!(component.values[63], 3.0, "{names:?}");
             }
@@ -393,10 +382,10 @@ mod tests {
         let time = Variable::new("time", &["time"], Data::f64([0.5]));
         let time = time.text("units", "minutes since 2024-1-31 13:00 +01:00");
         staggered(&path, names, vec![time]);
-        let place = places(&path, "u").unwrap().remove(0);
-        let date = place.reference.map(|date| date.to_string());
+        let (times, reference) = places(&path, "u").unwrap();
+        let date = reference.map(|date| date.to_string());
         assert_eq!(
-            (place.time_s, date.as_deref()),
+            (times[0].1, date.as_deref()),
             (30.0, Some("2024-01-31T12:00:00Z"))
         );
     }
@@ -406,8 +395,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("timed.nc");
         staggered(&path, [["x", "y", "z"]; 3], times);
-        let place = places(&path, "u").unwrap().remove(0);
-        (place.time_s, place.reference.map(|date| date.to_string()))
+        let (times, reference) = places(&path, "u").unwrap();
+        (times[0].1, reference.map(|date| date.to_string()))
     }
 
     #[test]

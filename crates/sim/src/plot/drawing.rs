@@ -131,28 +131,9 @@ pub(crate) struct Drawing {
     pub(crate) shapes: Vec<Shape>,
 }
 
-/// Part of a text with one position.
-#[derive(Debug, PartialEq)]
-pub(crate) struct TextRun<'a> {
-    pub(crate) text: &'a str,
-    /// Size of its letters, in sizes of the text.
-    pub(crate) scale: f64,
-    /// Height of its base line above that of the text, in sizes of the text.
-    pub(crate) rise: f64,
-}
-
-impl<'a> TextRun<'a> {
-    fn plain(text: &'a str) -> Self {
-        Self {
-            text,
-            scale: 1.0,
-            rise: 0.0,
-        }
-    }
-}
-
-/// Splits a text at `^{...}` and `_{...}`; a brace that is never closed is plain text.
-pub(crate) fn runs(text: &str) -> Vec<TextRun<'_>> {
+/// Parts of a text, each with the height of its base line above that of the text, in sizes of the text: `^{...}` and `_{...}` are
+/// raised and lowered; a brace that is never closed is plain text.
+pub(crate) fn runs(text: &str) -> Vec<(&str, f64)> {
     let mut out = Vec::new();
     let mut rest = text;
     while let Some((start, end)) = marked(rest) {
@@ -161,17 +142,18 @@ pub(crate) fn runs(text: &str) -> Vec<TextRun<'_>> {
         } else {
             -0.18
         };
-        out.push(TextRun::plain(&rest[..start]));
-        out.push(TextRun {
-            text: &rest[start + 2..end],
-            scale: 0.72,
-            rise,
-        });
+        out.push((&rest[..start], 0.0));
+        out.push((&rest[start + 2..end], rise));
         rest = &rest[end + 1..];
     }
-    out.push(TextRun::plain(rest));
-    out.retain(|run| !run.text.is_empty());
+    out.push((rest, 0.0));
+    out.retain(|(part, _)| !part.is_empty());
     out
+}
+
+/// Size of the letters of a part with that height, in sizes of the text.
+pub(crate) fn letter_size(rise: f64) -> f64 {
+    if rise == 0.0 { 1.0 } else { 0.72 }
 }
 
 /// Where the first marked part of a text begins, and where its closing brace is.
@@ -187,12 +169,8 @@ mod tests {
 
     #[test]
     fn raised_and_lowered_parts_are_split() {
-        let parts: Vec<(&str, f64)> = runs("Γ_{5-15} [m^{2}/s] v_mean")
-            .iter()
-            .map(|r| (r.text, r.rise))
-            .collect();
         assert_eq!(
-            parts,
+            runs("Γ_{5-15} [m^{2}/s] v_mean"),
             [
                 ("Γ", 0.0),
                 ("5-15", -0.18),
@@ -201,14 +179,7 @@ mod tests {
                 ("/s] v_mean", 0.0)
             ]
         );
-        assert_eq!(
-            runs("a^{b"),
-            [TextRun {
-                text: "a^{b",
-                scale: 1.0,
-                rise: 0.0
-            }]
-        );
+        assert_eq!(runs("a^{b"), [("a^{b", 0.0)]);
         assert!(runs("").is_empty());
     }
 }

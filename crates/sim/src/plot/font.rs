@@ -1,7 +1,7 @@
 //! The compiled-in font (Ubuntu Light): width of a text and outlines of its letters.
 //! Check: widths add up, and a raised part is narrower than the same letters on the line.
 
-use super::drawing::runs;
+use super::drawing::{letter_size, runs};
 use crate::Error;
 use tiny_skia::{Path, PathBuilder, Transform};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
@@ -49,13 +49,13 @@ impl Font {
 
     /// Each letter: glyph, width, drawing units for one of the font, height of its base line.
     fn letters(&self, text: &str, size: f64) -> impl Iterator<Item = (GlyphId, f64, f64, f64)> {
-        runs(text).into_iter().flat_map(move |run| {
-            let scale = size * run.scale / f64::from(self.face.units_per_em());
-            run.text.chars().map(move |c| {
+        runs(text).into_iter().flat_map(move |(part, rise)| {
+            let scale = size * letter_size(rise) / f64::from(self.face.units_per_em());
+            part.chars().map(move |c| {
                 // Glyph 0 is the font's sign for "no such letter".
                 let glyph = self.face.glyph_index(c).unwrap_or(GlyphId(0));
                 let advance = self.face.glyph_hor_advance(glyph).unwrap_or(0);
-                (glyph, scale * f64::from(advance), scale, size * run.rise)
+                (glyph, scale * f64::from(advance), scale, size * rise)
             })
         })
     }

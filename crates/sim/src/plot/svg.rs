@@ -3,7 +3,7 @@
 //! Check: the tests count elements and look for the escapes.
 
 use super::colour::Rgb;
-use super::drawing::{Anchor, Drawing, Frame, Shape, Text, runs};
+use super::drawing::{Anchor, Drawing, Frame, Shape, Text, letter_size, runs};
 use super::png_file::encode;
 use crate::Error;
 use crate::io::Provenance;
@@ -124,15 +124,15 @@ fn text_element(text: &Text) -> String {
         "<text transform=\"translate({x} {y}){turn}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{colour}\"{weight}>"
     );
     let mut height = 0.0;
-    for run in runs(&text.text) {
-        let shift = number(text.size * (height - run.rise));
-        let size = number(text.size * run.scale);
-        height = run.rise;
-        out += &match run.scale == 1.0 && shift == "0" {
-            true => escape(run.text),
+    for (part, rise) in runs(&text.text) {
+        let shift = number(text.size * (height - rise));
+        let size = number(text.size * letter_size(rise));
+        height = rise;
+        out += &match rise == 0.0 && shift == "0" {
+            true => escape(part),
             false => format!(
                 "<tspan dy=\"{shift}\" font-size=\"{size}\">{}</tspan>",
-                escape(run.text)
+                escape(part)
             ),
         };
     }

@@ -3,9 +3,10 @@
 //! Check: edges belong to the upper bin; unknown values have a bin of their own; the reference case.
 
 use super::Quantity;
-use super::matching::{Hit, MatchedScan};
+use super::matching::MatchedScan;
+use super::predictions::PredictedVortex;
 use super::ranked::Ranked;
-use super::sums::{FlightSums, distance_m};
+use super::sums::FlightSums;
 use super::truth::{TrueFlight, TrueScan, TrueVortex};
 use crate::io::data_set::Split;
 
@@ -118,21 +119,32 @@ impl Bin {
         &mut self.flights[last].1
     }
 
-    fn add_hit(&mut self, flight: usize, hit: &Hit, means: [f64; 3]) {
-        self.sums(flight).add_hit(hit, means);
+    /// Adds a scored vortex, with its prediction if it was found.
+    fn add_vortex(
+        &mut self,
+        flight: usize,
+        truth: &TrueVortex,
+        predicted: Option<&PredictedVortex>,
+        means: [f64; 3],
+    ) {
+        let Some(predicted) = predicted else {
+            self.sums(flight).missed += 1.0;
+            return;
+        };
+        self.sums(flight).add_hit(truth, predicted, means);
         for (errors, quantity) in self.errors.iter_mut().zip(Quantity::ALL) {
-            errors.push((hit.error(quantity).abs(), flight));
+            errors.push((predicted.error(truth, quantity).abs(), flight));
         }
-        self.errors[3].push((distance_m(hit), flight));
+        self.errors[3].push((predicted.distance_m(truth), flight));
     }
 
     fn add_scan(&mut self, flight: usize, scan: &MatchedScan, means: [f64; 3]) {
-        for hit in &scan.hits {
-            self.add_hit(flight, hit, means);
+        for (truth, predicted) in &scan.scored {
+            self.add_vortex(flight, truth, predicted.as_ref(), means);
         }
         self.sums(flight).add_scan(scan);
         let ranked = (scan.score.unwrap_or(f64::NEG_INFINITY), flight);
-        if scan.has_wake {
+        if scan.has_wake() {
             self.wakes.push(ranked);
         } else if scan.is_empty {
             self.empty.push(ranked);
@@ -167,14 +179,10 @@ pub(super) fn bins(scans: &[OfFlight<'_>], means: [f64; 3]) -> Vec<Bin> {
         ] {
             bin(&mut bins, group, position).add_scan(*index, matched, means);
         }
-        for hit in &matched.hits {
-            let position = height_position(&hit.truth, flight);
-            bin(&mut bins, Group::Height, position).add_hit(*index, hit, means);
-        }
-        for vortex in &matched.missed {
-            let position = height_position(vortex, flight);
-            let sums = bin(&mut bins, Group::Height, position).sums(*index);
-            sums.missed += 1.0;
+        for (truth, predicted) in &matched.scored {
+            let position = height_position(truth, flight);
+            let bin = bin(&mut bins, Group::Height, position);
+            bin.add_vortex(*index, truth, predicted.as_ref(), means);
         }
     }
     bins.sort_by_key(|bin| (bin.group, bin.position));

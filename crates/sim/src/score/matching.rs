@@ -8,24 +8,13 @@
 use super::predictions::{PredictedScan, PredictedVortex};
 use super::truth::{TrueScan, TrueVortex};
 
-/// A scored vortex that was found.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Hit {
-    pub(super) truth: TrueVortex,
-    pub(super) predicted: PredictedVortex,
-}
-
 /// A scan with what was found in it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct MatchedScan {
-    /// Scored vortices that were found.
-    pub(super) hits: Vec<Hit>,
-    /// Scored vortices that were not.
-    pub(super) missed: Vec<TrueVortex>,
+    /// Scored vortices, each with its prediction if it was found.
+    pub(super) scored: Vec<(TrueVortex, Option<PredictedVortex>)>,
     /// Predicted vortices that are none.
     pub(super) false_vortices: usize,
-    /// Whether a scored vortex is there.
-    pub(super) has_wake: bool,
     /// Whether no vortex exists. A scan with ignored vortices alone has no wake and is not empty.
     pub(super) is_empty: bool,
     /// Whether anything was predicted.
@@ -44,27 +33,24 @@ impl MatchedScan {
     ) -> Self {
         let vortices = &truth.vortices;
         let assignment = assign(vortices, &predicted.vortices, reach_m, least_m2_s);
-        let mut hits = Vec::new();
-        let mut missed = Vec::new();
+        let mut scored = Vec::new();
         for (vortex, found) in vortices.iter().zip(&assignment.found) {
-            match found {
-                _ if !vortex.is_scored(least_m2_s) => {}
-                Some(index) => hits.push(Hit {
-                    truth: *vortex,
-                    predicted: predicted.vortices[*index],
-                }),
-                None => missed.push(*vortex),
+            if vortex.is_scored(least_m2_s) {
+                scored.push((*vortex, found.map(|index| predicted.vortices[index])));
             }
         }
         Self {
-            has_wake: !hits.is_empty() || !missed.is_empty(),
-            hits,
-            missed,
+            scored,
             false_vortices: predicted.vortices.len() - assignment.pairs,
             is_empty: vortices.is_empty(),
             has_predicted: !predicted.vortices.is_empty(),
             score: predicted.score,
         }
+    }
+
+    /// Whether a scored vortex is there.
+    pub(super) fn has_wake(&self) -> bool {
+        !self.scored.is_empty()
     }
 }
 
@@ -240,8 +226,8 @@ mod tests {
             score: None,
         };
         let matched = MatchedScan::new(&truth, &predicted, 20.0, 50.0);
-        assert_eq!((matched.hits.len(), matched.missed.len()), (0, 0));
+        assert!(matched.scored.is_empty());
         assert_eq!(matched.false_vortices, 1);
-        assert!(!matched.has_wake && !matched.is_empty && matched.has_predicted);
+        assert!(!matched.has_wake() && !matched.is_empty && matched.has_predicted);
     }
 }

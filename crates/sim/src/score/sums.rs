@@ -3,7 +3,9 @@
 //! Check: the score of a normal law by quadrature; half widths of intervals by the error function.
 
 use super::Quantity;
-use super::matching::{Hit, MatchedScan};
+use super::matching::MatchedScan;
+use super::predictions::PredictedVortex;
+use super::truth::TrueVortex;
 use libm::erf;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
@@ -16,17 +18,17 @@ pub(super) const NOMINAL: [(f64, f64, &str); 4] = [
     (0.95, 1.959_963_984_540_053_4, "coverage_0.95"),
 ];
 
-impl Hit {
+impl PredictedVortex {
     /// Predicted less true.
-    pub(super) fn error(&self, quantity: Quantity) -> f64 {
-        self.predicted.values.value(quantity) - self.truth.values.value(quantity)
+    pub(super) fn error(&self, truth: &TrueVortex, quantity: Quantity) -> f64 {
+        self.values.value(quantity) - truth.values.value(quantity)
     }
-}
 
-/// Distance of a prediction from its vortex, m.
-pub(super) fn distance_m(hit: &Hit) -> f64 {
-    let y_m = hit.error(Quantity::LateralPosition);
-    y_m.hypot(hit.error(Quantity::Height))
+    /// Distance from its vortex, m.
+    pub(super) fn distance_m(&self, truth: &TrueVortex) -> f64 {
+        let y_m = self.error(truth, Quantity::LateralPosition);
+        y_m.hypot(self.error(truth, Quantity::Height))
+    }
 }
 
 /// Sums over the errors of a quantity.
@@ -104,32 +106,36 @@ pub(super) struct FlightSums {
 
 impl FlightSums {
     /// `means`: of each quantity over the training flights.
-    pub(super) fn add_hit(&mut self, hit: &Hit, means: [f64; 3]) {
+    pub(super) fn add_hit(
+        &mut self,
+        truth: &TrueVortex,
+        predicted: &PredictedVortex,
+        means: [f64; 3],
+    ) {
         for (index, quantity) in Quantity::ALL.into_iter().enumerate() {
             self.errors[index].add(
-                hit.error(quantity),
-                hit.truth.values.value(quantity),
-                hit.predicted.deviations.value(quantity),
+                predicted.error(truth, quantity),
+                truth.values.value(quantity),
+                predicted.deviations.value(quantity),
                 means[index],
             );
         }
-        self.distance_square_m2 += distance_m(hit).powi(2);
+        self.distance_square_m2 += predicted.distance_m(truth).powi(2);
         self.hits += 1.0;
     }
 
-    /// All but the hits.
+    /// All but the scored vortices.
     pub(super) fn add_scan(&mut self, scan: &MatchedScan) {
-        self.missed += scan.missed.len() as f64;
         self.false_vortices += scan.false_vortices as f64;
         let has_predicted = f64::from(scan.has_predicted);
-        if scan.has_wake {
+        if scan.has_wake() {
             self.wakes += 1.0;
             self.detected += has_predicted;
         } else if scan.is_empty {
             self.empty += 1.0;
             self.false_alarms += has_predicted;
         }
-        if scan.has_wake || scan.is_empty {
+        if scan.has_wake() || scan.is_empty {
             self.with_score += f64::from(scan.score.is_some());
         }
     }

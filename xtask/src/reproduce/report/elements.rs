@@ -130,7 +130,7 @@ fn power_of_ten(number: &str) -> String {
 }
 
 /// The rows of a CSV file as a table.
-fn table_of_csv(id: &str, csv: &str) -> Result<String, Failure> {
+pub(super) fn table_of_csv(id: &str, csv: &str) -> Result<String, Failure> {
     let (names, rows) = rows_of(csv);
     let header: Vec<&str> = names.iter().map(String::as_str).collect();
     let mut cells = Vec::new();
@@ -147,7 +147,7 @@ const THUMBNAIL_ROWS: usize = 5;
 const THUMBNAIL_COLUMNS: [(u32, usize); 2] = [(10, 23), (222, 11)];
 
 /// The first cells of a CSV file as a small picture.
-fn thumbnail_of_csv(csv: &str) -> String {
+pub(super) fn thumbnail_of_csv(csv: &str) -> String {
     let (names, rows) = rows_of(csv);
     let mut text = String::new();
     let lines = std::iter::once(&names).chain(&rows).take(THUMBNAIL_ROWS);
@@ -161,89 +161,66 @@ fn thumbnail_of_csv(csv: &str) -> String {
     format!("<svg viewBox=\"0 0 320 200\" aria-hidden=\"true\" class=\"cells\">{text}</svg>")
 }
 
-/// What a figure shows.
-pub(super) enum Picture<'s> {
-    /// A drawing, whose content a thumbnail can show again.
-    Drawing {
-        id: &'s str,
-        view_box: &'s str,
-        content: &'s str,
-    },
-    /// The rows of a table, as CSV.
-    Rows {
-        id: &'s str,
-        csv: std::borrow::Cow<'s, str>,
-    },
+/// The view box of an SVG file and what is drawn in it.
+///
+/// # Errors
+/// Fails unless it is one `<svg>` element with a view box and without script.
+fn view_box_and_content<'s>(id: &str, svg: &'s str) -> Result<(&'s str, &'s str), Failure> {
+    let (head, content) = svg
+        .strip_prefix("<svg ")
+        .and_then(|rest| rest.trim_end().strip_suffix("</svg>"))
+        .and_then(|rest| rest.split_once('>'))
+        .unwrap_or_default();
+    let view_box = head
+        .split_once("viewBox=\"")
+        .and_then(|(_, rest)| rest.split_once('"'))
+        .map_or("", |(view_box, _)| view_box);
+    if view_box.is_empty() || content.contains("<script") {
+        let start: String = svg.chars().take(20).collect();
+        return Err(Failure::new(format!(
+            "picture of {id} = {start}: one <svg> element with a viewBox and without script"
+        )));
+    }
+    Ok((view_box, content))
 }
 
-impl<'s> Picture<'s> {
-    /// From an SVG file.
-    ///
-    /// # Errors
-    /// Fails unless it is one `<svg>` element with a view box and without script.
-    pub(super) fn new(id: &'s str, svg: &'s str) -> Result<Self, Failure> {
-        let (head, content) = svg
-            .strip_prefix("<svg ")
-            .and_then(|rest| rest.trim_end().strip_suffix("</svg>"))
-            .and_then(|rest| rest.split_once('>'))
-            .unwrap_or_default();
-        let view_box = head
-            .split_once("viewBox=\"")
-            .and_then(|(_, rest)| rest.split_once('"'))
-            .map_or("", |(view_box, _)| view_box);
-        if view_box.is_empty() || content.contains("<script") {
-            let start: String = svg.chars().take(20).collect();
-            return Err(Failure::new(format!(
-                "picture of {id} = {start}: one <svg> element with a viewBox and without script"
-            )));
-        }
-        Ok(Self::Drawing {
-            id,
-            view_box,
-            content,
-        })
-    }
+/// The drawing of an SVG file, which a thumbnail can show again, with a text in its place for those who cannot see it.
+///
+/// # Errors
+/// As [`view_box_and_content`].
+pub(super) fn drawing(id: &str, svg: &str, alternative: &str) -> Result<String, Failure> {
+    let (view_box, content) = view_box_and_content(id, svg)?;
+    Ok(format!(
+        "<svg viewBox=\"{view_box}\" role=\"img\" aria-label=\"{}\" font-family=\"Ubuntu, 'Segoe UI', Arial, sans-serif\"><g id=\"picture-{id}\">{content}</g></svg>\n",
+        escape(alternative)
+    ))
+}
 
-    /// The whole of it, a drawing with a text in its place for those who cannot see it.
-    ///
-    /// # Errors
-    /// Fails if rows are no table.
-    pub(super) fn full(&self, alternative: &str) -> Result<String, Failure> {
-        match self {
-            Self::Drawing {
-                id,
-                view_box,
-                content,
-            } => Ok(format!(
-                "<svg viewBox=\"{view_box}\" role=\"img\" aria-label=\"{}\" font-family=\"Ubuntu, 'Segoe UI', Arial, sans-serif\"><g id=\"picture-{id}\">{content}</g></svg>\n",
-                escape(alternative)
-            )),
-            Self::Rows { id, csv } => table_of_csv(id, csv),
-        }
-    }
-
-    /// A row of its panels, of `rows`, once more and small; the link about it has the words.
-    pub(super) fn thumbnail(&self, (row, rows): (u32, u32)) -> String {
-        let (id, view_box) = match self {
-            Self::Drawing { id, view_box, .. } => (id, view_box),
-            Self::Rows { csv, .. } => return thumbnail_of_csv(csv),
-        };
-        let size: Vec<f64> = view_box.split(' ').flat_map(str::parse).collect();
-        let [left, top, width, all_height] = size[..] else {
-            return String::new();
-        };
-        let height = all_height / f64::from(rows);
-        let top = top + f64::from(row) * height;
-        // As large as fits, and cut at its own border, beyond which the other rows are.
-        let scale = (THUMBNAIL_SIZE[0] / width).min(THUMBNAIL_SIZE[1] / height);
-        let [shown_width, shown_height] = [scale * width, scale * height];
-        let x = 0.5 * (THUMBNAIL_SIZE[0] - shown_width);
-        let y = 0.5 * (THUMBNAIL_SIZE[1] - shown_height);
-        format!(
-            "<svg viewBox=\"0 0 320 200\" aria-hidden=\"true\"><svg x=\"{x}\" y=\"{y}\" width=\"{shown_width}\" height=\"{shown_height}\" \
-             viewBox=\"{left} {top} {width} {height}\"><use href=\"#picture-{id}\"/></svg></svg>"
-        )
-    }
+/// A row of the panels of a drawing, of `rows`, once more and small; the link about it has the words.
+///
+/// # Errors
+/// As [`view_box_and_content`].
+pub(super) fn thumbnail_of_drawing(
+    id: &str,
+    svg: &str,
+    (row, rows): (u32, u32),
+) -> Result<String, Failure> {
+    let (view_box, _) = view_box_and_content(id, svg)?;
+    let size: Vec<f64> = view_box.split(' ').flat_map(str::parse).collect();
+    let [left, top, width, all_height] = size[..] else {
+        return Ok(String::new());
+    };
+    let height = all_height / f64::from(rows);
+    let top = top + f64::from(row) * height;
+    // As large as fits, and cut at its own border, beyond which the other rows are.
+    let scale = (THUMBNAIL_SIZE[0] / width).min(THUMBNAIL_SIZE[1] / height);
+    let [shown_width, shown_height] = [scale * width, scale * height];
+    let x = 0.5 * (THUMBNAIL_SIZE[0] - shown_width);
+    let y = 0.5 * (THUMBNAIL_SIZE[1] - shown_height);
+    Ok(format!(
+        "<svg viewBox=\"0 0 320 200\" aria-hidden=\"true\"><svg x=\"{x}\" y=\"{y}\" width=\"{shown_width}\" height=\"{shown_height}\" \
+         viewBox=\"{left} {top} {width} {height}\"><use href=\"#picture-{id}\"/></svg></svg>"
+    ))
 }
 
 #[cfg(test)]
@@ -269,15 +246,14 @@ mod tests {
     #[test]
     fn a_picture_is_shown_twice_and_written_once() {
         let svg = "<svg width=\"2\" viewBox=\"0 0 2 1\"><rect/></svg>\n";
-        let picture = Picture::new("fig01", svg).unwrap();
-        let full = picture.full("a <b>").unwrap();
+        let full = drawing("fig01", svg, "a <b>").unwrap();
         assert!(full.contains("<g id=\"picture-fig01\"><rect/></g>"));
         assert!(full.contains("aria-label=\"a &lt;b&gt;\""));
-        let thumbnail = picture.thumbnail((0, 1));
+        let thumbnail = thumbnail_of_drawing("fig01", svg, (0, 1)).unwrap();
         assert!(thumbnail.contains("viewBox=\"0 0 2 1\"") && !thumbnail.contains("<rect"));
-        let lower = picture.thumbnail((1, 2));
+        let lower = thumbnail_of_drawing("fig01", svg, (1, 2)).unwrap();
         assert!(lower.contains("viewBox=\"0 0.5 2 0.5\""), "{lower}");
-        assert!(Picture::new("fig01", "<svg><script></svg>").is_err());
+        assert!(drawing("fig01", "<svg><script></svg>", "").is_err());
     }
 
     #[test]

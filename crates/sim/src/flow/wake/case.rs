@@ -1,7 +1,8 @@
 //! The wake of an aircraft near the ground: the keys of its case, their limits, the case of the solver.
 
-use super::super::setup::{Setup, WakeSetup};
+use super::super::setup::Setup;
 use super::super::vortex_pair::{STRETCH, check_pair};
+use super::history::WakeHistory;
 use crate::Error;
 use crate::keys::{ABOVE_ZERO, Checker, Is, ZERO_OR_MORE, keys};
 use wakescope_les::cases::{Case, VortexPairCase};
@@ -216,20 +217,21 @@ impl WakeFlow {
         } = pair
             .scaled(&scales, VortexPairCase::steps(LONGEST_STEP * unit_s))
             .map_err(Error::Flow)?;
-        let circulation_radii_m = self.circulation_radii_m;
-        let wake = Some(WakeSetup {
+        let core_radius_m = self.core_radius * scales.spacing_m;
+        let wake = WakeHistory::new(
             meter,
-            circulation_radii_m,
+            self.circulation_radii_m,
             scales,
-            core_radius_m: self.core_radius * scales.spacing_m,
-        });
+            core_radius_m,
+            &mesh,
+        );
         Ok(Setup {
             mesh,
             settings,
             initial,
             end_s: Some(end_s),
             tau_per_s: 1.0 / unit_s,
-            wake,
+            wake: Some(wake),
             undamped: None,
         })
     }

@@ -4,14 +4,14 @@
 //!
 //! Check: tests of `flow` interrupt runs and compare the bytes; rows against the record they came from.
 
-use super::super::setup::WakeSetup;
+use super::schedule::age_tau;
 use crate::Error;
 use crate::io::netcdf::{Data, Layout, Variable};
 use crate::io::{Provenance, Table, write_atomic};
 use std::ops::Range;
 use std::path::Path;
-use wakescope_les::Flow;
-use wakescope_les::analysis::{VortexRecord, WakeRecord, WakeScales};
+use wakescope_les::analysis::{VortexRecord, WakeMeter, WakeRecord, WakeScales};
+use wakescope_les::{Flow, Mesh};
 
 /// What a number is.
 #[derive(Debug)]
@@ -212,23 +212,37 @@ struct HistoryColumn {
     values: Vec<f64>,
 }
 
-/// The meter of a run and what it has found.
-pub(in super::super) struct WakeRun {
-    setup: WakeSetup,
+/// The meter of a wake with its scales, and what it has found.
+pub(in super::super) struct WakeHistory {
+    pub(in super::super) meter: WakeMeter,
+    /// Radii between which the circulation is averaged \[m\].
+    circulation_radii_m: [f64; 2],
+    pub(in super::super) scales: WakeScales,
+    /// Core radius at the start \[m\].
+    pub(in super::super) core_radius_m: f64,
     radius_m: Vec<f64>,
     x_m: Vec<f64>,
     /// Rows of numbers in SI units.
     rows: Vec<Vec<f64>>,
 }
 
-impl WakeRun {
-    /// An empty history of flows on the mesh of `flow`.
-    pub(in super::super) fn new(setup: WakeSetup, flow: &Flow) -> Self {
+impl WakeHistory {
+    /// An empty history of a flow on a mesh.
+    pub(super) fn new(
+        meter: WakeMeter,
+        circulation_radii_m: [f64; 2],
+        scales: WakeScales,
+        core_radius_m: f64,
+        mesh: &Mesh,
+    ) -> Self {
         Self {
-            radius_m: setup.meter.radii_m(),
-            x_m: flow.mesh().centre_m(0),
+            radius_m: meter.radii_m(),
+            meter,
+            circulation_radii_m,
+            scales,
+            core_radius_m,
+            x_m: mesh.centre_m(0),
             rows: Vec::new(),
-            setup,
         }
     }
 
@@ -258,14 +272,14 @@ impl WakeRun {
         if rows.len() % length != 0 || !bytes.len().is_multiple_of(8) {
             return None;
         }
-        self.setup.meter.restore(*state);
+        self.meter.restore(*state);
         self.rows = rows.chunks(length).map(<[f64]>::to_vec).collect();
         Some(())
     }
 
     /// What a checkpoint must keep.
     pub(in super::super) fn kept(&self) -> Vec<u8> {
-        let state = self.setup.meter.state();
+        let state = self.meter.state();
         let mut bytes = Vec::new();
         for number in state.iter().chain(self.rows.iter().flatten()) {
             bytes.extend(number.to_le_bytes());
@@ -275,14 +289,14 @@ impl WakeRun {
 
     /// Measures the flow, for which all ranks must ask together.
     pub(in super::super) fn record(&mut self, flow: &Flow) -> Result<(), Error> {
-        let record = self.setup.meter.measure(flow).map_err(Error::Flow)?;
+        let record = self.meter.measure(flow).map_err(Error::Flow)?;
         self.rows.push(row(&record));
         Ok(())
     }
 
     /// The numbers that tables have, those over their first value first.
     fn columns(&self) -> Vec<HistoryColumn> {
-        let [from, to] = self.setup.circulation_radii_m;
+        let [from, to] = self.circulation_radii_m;
         let radii_tag = format!("_{from}_{to}").replace('.', "p");
         let radii = format!(" from {from:?} to {to:?} m");
         let mut out = Vec::new();
@@ -338,10 +352,10 @@ impl WakeRun {
     }
 
     fn tau(&self) -> Vec<f64> {
-        let time_unit_s = self.setup.scales.time_unit_s();
+        let time_unit_s = self.scales.time_unit_s();
         self.rows
             .iter()
-            .map(|row| super::super::age_tau(row[0], 1.0 / time_unit_s))
+            .map(|row| age_tau(row[0], 1.0 / time_unit_s))
             .collect()
     }
 
@@ -394,7 +408,7 @@ impl WakeRun {
             ("mode", self.modes()),
         ];
         let mut layout = Layout::cf("History of a simulated wake", dims, variables, origin);
-        let scales = &self.setup.scales;
+        let scales = &self.scales;
         for (name, value) in [
             ("spacing_m", scales.spacing_m),
             ("circulation_m2_s", scales.circulation_m2_s),

@@ -16,11 +16,11 @@ mod schedule;
 
 pub use case::{PairScale, WakeFlow, WakeProfile};
 pub use finished::{FinishedWake, table};
-pub(super) use history::{HISTORIES, WakeRun};
+pub(super) use history::{HISTORIES, WakeHistory};
 pub use output::WakeOutput;
 #[cfg(feature = "plots")]
 pub(super) use pictures::PICTURES;
 #[cfg(feature = "plots")]
 pub use pictures::REPEATS;
 pub use preset::WakePreset;
-pub(super) use schedule::{Due, plain_schedule, wake_schedule};
+pub(super) use schedule::{Due, age_tau, plain_schedule, wake_schedule};

@@ -5,7 +5,7 @@
 
 use super::finished::FinishedWake;
 use crate::Error;
-use crate::io::fields_input::{FieldPlace, read_scalar};
+use crate::io::fields_input::read_scalar;
 use crate::io::{CrossPlanes, FileGroup, planes_input};
 use crate::plot::{
     Axis, Cells, ColourMap, CurvePlot, Figure, IsosurfacePlot, MapPlot, Panel, Series, Style,
@@ -132,16 +132,10 @@ impl FinishedWake {
             if !path.exists() {
                 return Ok(None);
             }
-            let place = FieldPlace {
-                path,
-                place: Some(0),
-                time_s: 0.0,
-                reference: None,
-            };
             let VolumeComponent {
                 nodes_m: [x, y, z],
                 values,
-            } = read_scalar(&place, "vorticity_magnitude")?;
+            } = read_scalar(&path, Some(0), "vorticity_magnitude")?;
             let scales = self.scales;
             let unit_per_s = self.scales.vorticity_per_s();
             let length = self.flow.size[0];
@@ -315,12 +309,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let outcome = run(&file, folder.path(), Begin::New, &Silent).unwrap();
         let path = folder.path().join("fields_0001.nc");
-        let [place] = &places(&path, "vorticity_magnitude").unwrap()[..] else {
+        let (times, _) = places(&path, "vorticity_magnitude").unwrap();
+        let [(place, time_s)] = times[..] else {
             panic!("one time")
         };
-        let field = read_scalar(place, "vorticity_magnitude").unwrap();
+        let field = read_scalar(&path, place, "vorticity_magnitude").unwrap();
         assert_eq!(field.nodes_m.each_ref().map(Vec::len), [4, 16, 12]);
-        assert!((place.time_s - outcome.time_s).abs() < 1e-9);
+        assert!((time_s - outcome.time_s).abs() < 1e-9);
         // The core turns by Gamma0/(pi r_c^2) at its centre; three cells see part of it.
         let largest = field.values.iter().copied().fold(0.0, f64::max);
         let core_per_s = 500.0 / (std::f64::consts::PI * 4.7_f64.powi(2));

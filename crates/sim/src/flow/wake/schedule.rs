@@ -20,6 +20,11 @@ pub(in super::super) struct Due {
     pub(in super::super) planes: Option<usize>,
 }
 
+/// Age of a wake at a time, without the last digits, in which it may differ from the requested age.
+pub(in super::super) fn age_tau(time_s: f64, tau_per_s: f64) -> f64 {
+    crate::quantities::rounded(time_s * tau_per_s, 13)
+}
+
 /// Ages from one to another, a step apart.
 fn ages([from, to]: [f64; 2], step: f64) -> Vec<f64> {
     let count = ((to - from) / step + SAME).floor() as usize;

@@ -5,7 +5,7 @@
 //! files without Nyquist velocity, with ragged gates, another sign, several sweeps.
 
 use super::gate_layout::GateLayout;
-use super::grid::{RayRow, mean_count, of_mean, scan_map};
+use super::grid::{mean_count, of_mean, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::netcdf_input::{NetcdfFile, quoted};
@@ -37,7 +37,7 @@ pub(super) fn scans(
     sweep: usize,
 ) -> Result<Found, String> {
     let mut range_m = ranges(file)?;
-    let velocity = VelocityVariable::new(file, format)?;
+    let velocity = velocity_name(file, format)?;
     let mut rays = Rays::read(file, format, &velocity, range_m.len())?;
     turn_falling(&mut range_m, &mut rays.rows);
     if let Some(text) = rays.rounded {
@@ -59,9 +59,8 @@ pub(super) fn scans(
         let number = number + sweep;
         let what = format!("sweep {number}");
         let known: Vec<usize> = range.filter(|ray| rays.is_still[*ray]).collect();
-        for (fold_m_s, own) in by_fold(&known, &rays.fold_m_s) {
-            let rows: Vec<RayRow> = own.iter().map(|ray| rays.rows[*ray].clone()).collect();
-            let (scans, skipped) = match planes::in_order(rows) {
+        for (fold_m_s, own) in by_fold(&known, &rays.rows) {
+            let (scans, skipped) = match planes::in_order(own) {
                 Ok(split) => split,
                 Err(reason) => {
                     found.skipped.push(format!("{what}: {reason}"));
@@ -99,7 +98,7 @@ pub(super) fn rays(
     sweep: usize,
 ) -> Result<FoundRays, String> {
     let mut ranges_m = ray_ranges(file, elevations_rad(file)?.len())?;
-    let velocity = VelocityVariable::new(file, format)?;
+    let velocity = velocity_name(file, format)?;
     let gates = ranges_m.first().map_or(0, Vec::len);
     let mut rays = Rays::read(file, format, &velocity, gates)?;
     if let [common_m] = &mut ranges_m[..] {
@@ -112,16 +111,9 @@ pub(super) fn rays(
     for (number, range) in rays.sweeps.into_iter().enumerate() {
         let mut own = Vec::with_capacity(range.len());
         for ray in range.filter(|ray| rays.is_still[*ray]) {
-            let row = &rays.rows[ray];
-            let fold_m_s = rays.fold_m_s[ray];
             own.push(Ray {
-                azimuth_rad: row.azimuth_rad,
-                elevation_rad: row.elevation_rad,
-                time_s: row.time_s,
                 range_m: ranges_m[ray.min(ranges_m.len() - 1)].clone(),
-                velocity_m_s: row.velocity_m_s.clone(),
-                sigma_m_s: row.sigma_m_s.clone(),
-                fold_m_s: (fold_m_s > 0.0 && fold_m_s.is_finite()).then_some(fold_m_s),
+                ..rays.rows[ray].clone()
             });
         }
         sweeps.push(RaySweep {
@@ -142,10 +134,10 @@ pub(super) fn rays(
 }
 
 /// The scene of a file of this program, whole or what other programs left of it.
-fn scene_of<'f>(file: &'f NetcdfFile, velocity: &VelocityVariable) -> Option<&'f str> {
+fn scene_of<'f>(file: &'f NetcdfFile, velocity: &str) -> Option<&'f str> {
     file.global_text("scene")
-        .or_else(|| file.text(&velocity.name, "scene"))
-        .or_else(|| file.text(&velocity.name, "instrument"))
+        .or_else(|| file.text(velocity, "scene"))
+        .or_else(|| file.text(velocity, "instrument"))
         .filter(|text| !text.is_empty())
 }
 
@@ -224,7 +216,7 @@ fn elevations_rad(file: &NetcdfFile) -> Result<Vec<f64>, String> {
 }
 
 /// Turns ranges that fall from gate to gate round, with the velocities along them.
-fn turn_falling(range_m: &mut [f64], rows: &mut [RayRow]) {
+fn turn_falling(range_m: &mut [f64], rows: &mut [Ray]) {
     if range_m.len() < 2 || range_m.windows(2).any(|pair| pair[1] >= pair[0]) {
         return;
     }
@@ -237,11 +229,9 @@ fn turn_falling(range_m: &mut [f64], rows: &mut [RayRow]) {
 
 /// The rays of a file.
 struct Rays {
-    rows: Vec<RayRow>,
+    rows: Vec<Ray>,
     /// Whether the head did not move to another place during a ray.
     is_still: Vec<bool>,
-    /// Multiples of which velocities may lack, m/s, for each ray; NaN of none.
-    fold_m_s: Vec<f64>,
     sweeps: Vec<std::ops::Range<usize>>,
     /// The date from which times count.
     reference: Option<UtcTime>,
@@ -256,7 +246,7 @@ impl Rays {
     fn read(
         file: &NetcdfFile,
         format: &ScanFormat,
-        velocity: &VelocityVariable,
+        velocity: &str,
         gates: usize,
     ) -> Result<Self, String> {
         let elevation_rad = elevations_rad(file)?;
@@ -270,11 +260,12 @@ impl Rays {
             None => None,
         };
         let times = times(file, count)?;
-        let layout = GateLayout::new(file, &velocity.name, [count, gates])?;
+        let layout = GateLayout::new(file, velocity, [count, gates])?;
         let velocity_m_s = velocities_m_s(format, velocity, &layout)?;
-        let counts = match velocity.is_mean {
-            true => layout.optional("count")?,
-            false => None,
+        // The velocity may be the mean of several scans.
+        let counts = match file.text(velocity, "cell_methods") {
+            Some(methods) if methods.contains("realization: mean") => layout.optional("count")?,
+            _ => None,
         };
         let sigma_m_s = sigmas_m_s(&layout, counts.as_deref())?;
         // Mirrored velocities are no multiple away from those of the air.
@@ -284,25 +275,24 @@ impl Rays {
         let nyquist_m_s = nyquist_m_s.filter(|_| !is_mirrored);
         let mut rows = Vec::with_capacity(count);
         let mut is_still = Vec::with_capacity(count);
-        let mut fold_m_s = Vec::with_capacity(count);
         for ray in 0..count {
             let cells = ray * gates..(ray + 1) * gates;
             let sigma_m_s = sigma_m_s.as_ref().map(|all| all[cells.clone()].to_vec());
-            rows.push(RayRow {
+            let fold_m_s = nyquist_m_s.as_ref().map(|all| 2.0 * all[ray]);
+            rows.push(Ray {
                 elevation_rad: elevation_rad[ray],
                 azimuth_rad: azimuth_rad[ray],
                 time_s: times.time_s[ray],
                 velocity_m_s: velocity_m_s[cells].to_vec(),
                 sigma_m_s: sigma_m_s.unwrap_or_default(),
+                fold_m_s: fold_m_s.filter(|fold| *fold > 0.0 && fold.is_finite()),
+                ..Ray::default()
             });
             is_still.push(moving.as_ref().is_none_or(|moves| moves[ray] != 1.0));
-            let nyquist_m_s = nyquist_m_s.as_ref().map_or(f64::NAN, |all| all[ray]);
-            fold_m_s.push(2.0 * nyquist_m_s);
         }
         Ok(Self {
             rows,
             is_still,
-            fold_m_s,
             sweeps,
             reference: times.reference,
             scans: mean_count(counts.iter().flatten().copied()),
@@ -329,14 +319,17 @@ fn ray_values(
     }
 }
 
-/// Rays in groups of one Nyquist velocity, with the multiple of which their velocities may lack: its double, if it is known.
-fn by_fold(rays: &[usize], fold_m_s: &[f64]) -> Vec<(Option<f64>, Vec<usize>)> {
-    let mut groups: Vec<(Option<f64>, Vec<usize>)> = Vec::new();
-    for ray in rays {
-        let own = Some(fold_m_s[*ray]).filter(|fold| *fold > 0.0 && fold.is_finite());
-        match groups.iter_mut().find(|(fold, _)| is_one_fold(*fold, own)) {
-            Some((_, group)) => group.push(*ray),
-            None => groups.push((own, vec![*ray])),
+/// Rays of some numbers in groups of one Nyquist velocity, with the multiple of which their velocities may lack: its double, if it is known.
+fn by_fold(numbers: &[usize], rays: &[Ray]) -> Vec<(Option<f64>, Vec<Ray>)> {
+    let mut groups: Vec<(Option<f64>, Vec<Ray>)> = Vec::new();
+    for number in numbers {
+        let ray = rays[*number].clone();
+        match groups
+            .iter_mut()
+            .find(|(fold, _)| is_one_fold(*fold, ray.fold_m_s))
+        {
+            Some((_, group)) => group.push(ray),
+            None => groups.push((ray.fold_m_s, vec![ray])),
         }
     }
     groups
@@ -353,13 +346,13 @@ fn is_one_fold(fold_m_s: Option<f64>, other_m_s: Option<f64>) -> bool {
 /// flags them.
 fn velocities_m_s(
     format: &ScanFormat,
-    velocity: &VelocityVariable,
+    velocity: &str,
     layout: &GateLayout,
 ) -> Result<Vec<f64>, String> {
     let file = layout.file;
     let mut velocity_m_s = layout.spread(
-        &velocity.name,
-        variable::values(file, &velocity.name, Quantity::Velocity)?,
+        velocity,
+        variable::values(file, velocity, Quantity::Velocity)?,
     )?;
     let status_of = |name: &str| match format.ignores_status {
         true => Ok(None),
@@ -377,6 +370,11 @@ fn velocities_m_s(
         (Some(_), Some(name)) => Some(layout.spread(name, variable::ratio_db(file, name)?)?),
         (Some(_), None) => return Err(super::NO_RATIO.to_owned()),
     };
+    let sign = if variable::is_towards(file, velocity) {
+        -1.0
+    } else {
+        format.sign()
+    };
     for (at, value) in velocity_m_s.iter_mut().enumerate() {
         let is_noise = ratio_db
             .as_ref()
@@ -385,11 +383,7 @@ fn velocities_m_s(
             || status
                 .as_ref()
                 .is_some_and(|status| !trusted.contains(&status[at]));
-        *value = if is_noise {
-            f64::NAN
-        } else {
-            velocity.sign * *value
-        };
+        *value = if is_noise { f64::NAN } else { sign * *value };
     }
     Ok(velocity_m_s)
 }
@@ -432,42 +426,24 @@ fn sigmas_m_s(layout: &GateLayout, counts: Option<&[f64]>) -> Result<Option<Vec<
     Ok(Some(sigma_m_s))
 }
 
-/// The variable that holds the velocities.
-struct VelocityVariable {
-    name: String,
-    /// 1 for velocities that are positive away from the lidar.
-    sign: f64,
-    /// Whether it is the mean of several scans.
-    is_mean: bool,
-}
-
-impl VelocityVariable {
-    fn new(file: &NetcdfFile, format: &ScanFormat) -> Result<Self, String> {
-        let name = match &format.field {
-            Some(name) if file.has(name) => {
-                variable::refuse_other_than_velocity(file, name)?;
-                name.clone()
-            }
-            Some(name) => return Err(format!("it has no variable {name}, which --field names")),
-            None => variable::find(file, &VELOCITY)
-                .map(str::to_owned)
-                .ok_or_else(|| no_velocity(file))?,
-        };
-        if format.towards && variable::is_away(file, &name) {
-            return Err(format!(
-                "--towards: the standard name of its variable {name} says that velocities are positive away from the lidar"
-            ));
+/// The name of the variable that holds the velocities.
+fn velocity_name(file: &NetcdfFile, format: &ScanFormat) -> Result<String, String> {
+    let name = match &format.field {
+        Some(name) if file.has(name) => {
+            variable::refuse_other_than_velocity(file, name)?;
+            name.clone()
         }
-        let is_towards = variable::is_towards(file, &name) || format.towards;
-        let is_mean = file
-            .text(&name, "cell_methods")
-            .is_some_and(|methods| methods.contains("realization: mean"));
-        Ok(Self {
-            name,
-            sign: if is_towards { -1.0 } else { 1.0 },
-            is_mean,
-        })
+        Some(name) => return Err(format!("it has no variable {name}, which --field names")),
+        None => variable::find(file, &VELOCITY)
+            .map(str::to_owned)
+            .ok_or_else(|| no_velocity(file))?,
+    };
+    if format.towards && variable::is_away(file, &name) {
+        return Err(format!(
+            "--towards: the standard name of its variable {name} says that velocities are positive away from the lidar"
+        ));
     }
+    Ok(name)
 }
 
 /// What is said of a file without a variable of velocities, or with one of a type that is not read.

@@ -3,22 +3,10 @@
 //! Check: lines of one elevation; what makes no map.
 
 use super::planes::FEWEST_LINES;
+use super::rays::Ray;
 use crate::interpolation::interpolate;
 use ndarray::Array2;
 use wakescope_estimate::retrieval::ScanMap;
-
-/// A line of sight as a file has it.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct RayRow {
-    pub(super) elevation_rad: f64,
-    /// NaN if unknown.
-    pub(super) azimuth_rad: f64,
-    /// NaN if unknown.
-    pub(super) time_s: f64,
-    pub(super) velocity_m_s: Vec<f64>,
-    /// Empty if there are none.
-    pub(super) sigma_m_s: Vec<f64>,
-}
 
 /// Farthest range of the last gate, m: that of a scene; and the nearest.
 const FARTHEST_M: f64 = 1e6;
@@ -57,9 +45,9 @@ pub(super) fn mean_count(counts: impl Iterator<Item = f64>) -> f64 {
     if cells > 0.0 { sum / cells } else { 1.0 }
 }
 
-/// The map of rays; `what` names the scan in messages.
+/// The map of rays, all with the gates of `range_m`; `what` names the scan in messages.
 pub(super) fn scan_map(
-    mut rays: Vec<RayRow>,
+    mut rays: Vec<Ray>,
     mut range_m: Vec<f64>,
     fold_m_s: Option<f64>,
     what: &str,
@@ -68,7 +56,7 @@ pub(super) fn scan_map(
     check_ranges(&range_m).map_err(|reason| format!("{what}: {reason}"))?;
     let gates = range_m.len();
     rays.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
-    let lines: Vec<&[RayRow]> = rays
+    let lines: Vec<&[Ray]> = rays
         .chunk_by(|a, b| a.elevation_rad == b.elevation_rad)
         .collect();
     if lines.len() < FEWEST_LINES || gates < FEWEST_GATES {
@@ -125,7 +113,7 @@ fn fill_times(elevation_rad: &[f64], time_s: &mut [f64]) {
 }
 
 /// Removes gates of unknown range, those at the lidar, and those before it without velocities.
-fn drop_empty_gates(rays: &mut [RayRow], range_m: &mut Vec<f64>) {
+fn drop_empty_gates(rays: &mut [Ray], range_m: &mut Vec<f64>) {
     let mut kept = Vec::with_capacity(range_m.len());
     for (gate, range_m) in range_m.iter().enumerate() {
         let has_velocities = || rays.iter().any(|ray| ray.velocity_m_s[gate].is_finite());
@@ -182,7 +170,7 @@ pub(super) fn check_extent(farthest_m: f64) -> Result<(), String> {
 }
 
 /// Refuses elevations that span too little for a vortex, such as radians that are said to be degrees.
-fn check_width(lines: &[&[RayRow]], range_m: &[f64]) -> Result<(), String> {
+fn check_width(lines: &[&[Ray]], range_m: &[f64]) -> Result<(), String> {
     let lowest_rad = lines[0][0].elevation_rad;
     let highest_rad = lines[lines.len() - 1][0].elevation_rad;
     let width_m = (highest_rad - lowest_rad) * range_m[range_m.len() - 1];
@@ -215,7 +203,7 @@ fn check_velocities(velocity_m_s: &Array2<f64>) -> Result<(), String> {
 }
 
 /// Standard deviations of the velocities of lines, if rays have them; velocities of unknown standard deviation become missing.
-fn line_sigmas_m_s(lines: &[&[RayRow]], velocity_m_s: &mut Array2<f64>) -> Option<Array2<f64>> {
+fn line_sigmas_m_s(lines: &[&[Ray]], velocity_m_s: &mut Array2<f64>) -> Option<Array2<f64>> {
     let mut rays = lines.iter().copied().flatten();
     if rays.any(|ray| ray.sigma_m_s.is_empty()) {
         return None;
@@ -252,13 +240,13 @@ fn finite_mean(mut values: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
 
-    fn rays(elevations: impl IntoIterator<Item = f64>) -> Vec<RayRow> {
-        let ray = |(i, elevation_rad): (usize, f64)| RayRow {
+    fn rays(elevations: impl IntoIterator<Item = f64>) -> Vec<Ray> {
+        let ray = |(i, elevation_rad): (usize, f64)| Ray {
             elevation_rad,
             azimuth_rad: 1.0,
             time_s: i as f64,
             velocity_m_s: vec![i as f64; 12],
-            sigma_m_s: Vec::new(),
+            ..Ray::default()
         };
         elevations.into_iter().enumerate().map(ray).collect()
     }
@@ -317,7 +305,7 @@ mod tests {
 
     #[test]
     fn what_is_no_scan_is_refused_by_name() {
-        let refused = |rays: Vec<RayRow>, range_m: Vec<f64>| {
+        let refused = |rays: Vec<Ray>, range_m: Vec<f64>| {
             scan_map(rays, range_m, None, "sweep 3").unwrap_err()
         };
         assert!(

@@ -4,7 +4,7 @@
 //! the scan type decides. Noise has velocities over the whole band; it is recognised by its intensity.
 //! Check: a map written by this program comes back; each dialect; files that are cut short, and scans that were stopped.
 
-use super::grid::{RayRow, scan_map};
+use super::grid::scan_map;
 use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::UtcTime;
@@ -38,7 +38,7 @@ struct Header {
 }
 
 /// The header of a text and its rays, before they are put into scans.
-fn parse(text: &str, format: &ScanFormat) -> Result<(Header, Vec<RayRow>), String> {
+fn parse(text: &str, format: &ScanFormat) -> Result<(Header, Vec<Ray>), String> {
     let mut lines = text.lines().enumerate();
     let mut head = Vec::new();
     for (_, line) in lines.by_ref() {
@@ -67,18 +67,10 @@ pub(super) fn rays_of_text(
     path: &Path,
     format: &ScanFormat,
 ) -> Result<FoundRays, String> {
-    let (header, rows) = parse(text, format)?;
+    let (header, mut rays) = parse(text, format)?;
     let range_m = header.range_m();
-    let mut rays = Vec::with_capacity(rows.len());
-    for row in rows {
-        rays.push(Ray {
-            azimuth_rad: row.azimuth_rad,
-            elevation_rad: row.elevation_rad,
-            time_s: row.time_s,
-            range_m: range_m.clone(),
-            velocity_m_s: row.velocity_m_s,
-            ..Ray::default()
-        });
+    for ray in &mut rays {
+        ray.range_m.clone_from(&range_m);
     }
     let sweep = RaySweep {
         path: path.to_owned(),
@@ -121,8 +113,8 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
 }
 
 /// The rays of numbered lines and the intensities of their gates.
-fn rays(header: &Header, lines: &[(usize, &str)]) -> Result<(Vec<RayRow>, Vec<Vec<f64>>), String> {
-    let mut rays: Vec<RayRow> = Vec::new();
+fn rays(header: &Header, lines: &[(usize, &str)]) -> Result<(Vec<Ray>, Vec<Vec<f64>>), String> {
+    let mut rays: Vec<Ray> = Vec::new();
     let mut intensities: Vec<Vec<f64>> = Vec::new();
     let mut all_hours = Vec::new();
     let mut rest = lines.iter();
@@ -158,12 +150,12 @@ fn rays(header: &Header, lines: &[(usize, &str)]) -> Result<(Vec<RayRow>, Vec<Ve
                 intensity[gate] = row[2];
             }
         }
-        rays.push(RayRow {
+        rays.push(Ray {
             elevation_rad: elevation.to_radians(),
             azimuth_rad: azimuth.to_radians(),
             time_s: f64::NAN,
             velocity_m_s,
-            sigma_m_s: Vec::new(),
+            ..Ray::default()
         });
         intensities.push(intensity);
         all_hours.push(hours);
@@ -319,7 +311,7 @@ fn check_intensities(intensities: &[Vec<f64>]) -> Result<(), String> {
 }
 
 /// Takes out the velocities of noise.
-fn mask_noise(rays: &mut [RayRow], intensities: &[Vec<f64>], format: &ScanFormat) {
+fn mask_noise(rays: &mut [Ray], intensities: &[Vec<f64>], format: &ScanFormat) {
     let least = match format.min_snr_db {
         Some(db) => 1.0 + 10f64.powf(0.1 * db),
         None if format.ignores_status => f64::NEG_INFINITY,

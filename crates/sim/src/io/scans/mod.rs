@@ -222,9 +222,8 @@ fn netcdf(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
 }
 
 fn text(path: &Path, length: u64, format: &ScanFormat) -> Result<Found, Error> {
-    let text = decoded(&text_bytes(path, length)?, path);
-    text.and_then(|text| scans_of_text(&text, path, format))
-        .map_err(|reason| Error::input(path, reason))
+    let bytes = text_bytes(path, length)?;
+    scans_of_text(&bytes, path, format).map_err(|reason| Error::input(path, reason))
 }
 
 /// The bytes of a text that is not too large.
@@ -241,25 +240,26 @@ fn text_bytes(path: &Path, length: u64) -> Result<Vec<u8>, Error> {
     std::fs::read(path).map_err(Error::io("read", path))
 }
 
-fn scans_of_text(text: &Text, path: &Path, format: &ScanFormat) -> Result<Found, String> {
-    match text {
-        Text::Hpl(_) if format.field.is_some() => Err(NO_FIELD.into()),
-        Text::Hpl(text) => hpl::scans(text, path, format),
-        Text::Table(text) => table::scans(text, path, format),
+fn scans_of_text(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<Found, String> {
+    let text = decoded(bytes, path, format)?;
+    if is_hpl(&text) {
+        hpl::scans(&text, path, format)
+    } else {
+        table::scans(&text, path, format)
     }
 }
 
-/// A text by its kind.
-enum Text {
-    Hpl(String),
-    Table(String),
+/// Whether a text is a HALO file of rays, and no table.
+fn is_hpl(text: &str) -> bool {
+    let mut lines = text.lines().take(60);
+    lines.any(|line| line.trim_start().starts_with("****"))
 }
 
 /// The text of a file of scans.
 ///
 /// # Errors
-/// Bytes that are no text; a file called as those of HALO without their header.
-fn decoded(bytes: &[u8], path: &Path) -> Result<Text, String> {
+/// Bytes that are no text; a file called as those of HALO without their header; a field of a HALO file, which has one column of velocities.
+fn decoded(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<String, String> {
     // The text, and a text of its own for each cell.
     let cells = bytes
         .iter()
@@ -278,24 +278,19 @@ fn decoded(bytes: &[u8], path: &Path) -> Result<Text, String> {
                     read"
             .into());
     }
-    let is_hpl = text
-        .lines()
-        .take(60)
-        .any(|line| line.trim_start().starts_with("****"));
     let is_called_hpl = path
         .extension()
         .is_some_and(|end| end.eq_ignore_ascii_case("hpl"));
-    match (is_hpl, is_called_hpl) {
-        (true, _) => Ok(Text::Hpl(text)),
+    match (is_hpl(&text), is_called_hpl) {
+        (true, _) if format.field.is_some() => {
+            Err("--field has no effect: a HALO file has one column of velocities".into())
+        }
         (false, true) => Err("it has no line ****, which ends the header of a HALO file of rays; profiles of winds and of the background are \
                               not read"
             .into()),
-        (false, false) => Ok(Text::Table(text)),
+        _ => Ok(text),
     }
 }
-
-/// What is said of a variable of velocities in a file that has one column of them.
-const NO_FIELD: &str = "--field has no effect: a HALO file has one column of velocities";
 
 #[cfg(test)]
 mod tests {
@@ -336,10 +331,13 @@ mod tests {
 
     #[test]
     fn what_is_no_text_of_a_scan_is_told_apart() {
-        let kind = |bytes: &[u8], name: &str| match decoded(bytes, Path::new(name)) {
-            Ok(Text::Hpl(text)) => format!("hpl {}", text.lines().count()),
-            Ok(Text::Table(text)) => format!("table {}", text.lines().count()),
-            Err(reason) => reason,
+        let kind = |bytes: &[u8], name: &str| {
+            let text = match decoded(bytes, Path::new(name), &ScanFormat::default()) {
+                Ok(text) => text,
+                Err(reason) => return reason,
+            };
+            let kind = if is_hpl(&text) { "hpl" } else { "table" };
+            format!("{kind} {}", text.lines().count())
         };
         for end in ["\n", "\r\n", "\r"] {
             let hpl = ["Number of gates: 3", "****", "12.0 90.0 3.0"].join(end);

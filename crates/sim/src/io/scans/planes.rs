@@ -7,7 +7,7 @@
 //! Check: scans up and down, over the zenith, of several planes in turn, with transition rays, about azimuth 0.
 
 use super::ReadScan;
-use super::grid::RayRow;
+use super::rays::Ray;
 use super::velocities::drop_missing;
 use ndarray::s;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
@@ -47,7 +47,7 @@ const MOST_BETWEEN: usize = 5;
 pub(super) struct PlaneScan {
     /// From 0 to 2 pi; none if it is unknown.
     pub(super) azimuth_rad: Option<f64>,
-    pub(super) rays: Vec<RayRow>,
+    pub(super) rays: Vec<Ray>,
 }
 
 /// Scans, and what was skipped.
@@ -61,7 +61,7 @@ struct Plane {
 
 impl Plane {
     /// The plane of the first ray whose azimuth says something.
-    fn first_of<'r>(rays: impl IntoIterator<Item = &'r RayRow>) -> Self {
+    fn first_of<'r>(rays: impl IntoIterator<Item = &'r Ray>) -> Self {
         let azimuth_rad = rays.into_iter().find(|ray| is_directed(ray));
         Self {
             azimuth_rad: azimuth_rad.map_or(f64::NAN, |ray| ray.azimuth_rad),
@@ -69,33 +69,33 @@ impl Plane {
     }
 
     /// Azimuth of a ray relative to the front; 0 if either is unknown.
-    fn turn_rad(self, ray: &RayRow) -> f64 {
+    fn turn_rad(self, ray: &Ray) -> f64 {
         let turn_rad = difference_rad(ray.azimuth_rad, self.azimuth_rad);
         if turn_rad.is_nan() { 0.0 } else { turn_rad }
     }
 
     /// Component of a ray across the plane, the sine of the angle between them.
-    fn across(self, ray: &RayRow) -> f64 {
+    fn across(self, ray: &Ray) -> f64 {
         self.turn_rad(ray).sin() * ray.elevation_rad.cos()
     }
 
     /// Whether the azimuth of a ray is that of the back, so that its elevation counts beyond the zenith.
-    fn is_behind(self, ray: &RayRow) -> bool {
+    fn is_behind(self, ray: &Ray) -> bool {
         self.turn_rad(ray).abs() > FRAC_PI_2
     }
 
     /// Whether a ray lies in the front of the plane.
-    fn has_in_front(self, ray: &RayRow) -> bool {
+    fn has_in_front(self, ray: &Ray) -> bool {
         self.across(ray).abs() <= OFF_PLANE_RAD && !self.is_behind(ray)
     }
 
     /// Whether a ray lies in the back of the plane.
-    fn has_behind(self, ray: &RayRow) -> bool {
+    fn has_behind(self, ray: &Ray) -> bool {
         self.is_behind(ray) && self.across(ray).abs() <= OFF_PLANE_RAD
     }
 
     /// Elevation of a ray from the horizon in front, rad.
-    fn elevation_rad(self, ray: &RayRow) -> f64 {
+    fn elevation_rad(self, ray: &Ray) -> f64 {
         if self.is_behind(ray) {
             PI - ray.elevation_rad
         } else {
@@ -104,7 +104,7 @@ impl Plane {
     }
 
     /// Azimuth of a ray or, of one behind, of its opposite, relative to the front.
-    fn front_turn_rad(self, ray: &RayRow) -> f64 {
+    fn front_turn_rad(self, ray: &Ray) -> f64 {
         let turn_rad = self.turn_rad(ray);
         if self.is_behind(ray) {
             turn_rad - PI.copysign(turn_rad)
@@ -114,7 +114,7 @@ impl Plane {
     }
 
     /// Whether the scanner can have gone from one ray to the next within a scan: it comes to the other side over the zenith alone.
-    fn goes_on(self, before: &RayRow, next: &RayRow) -> bool {
+    fn goes_on(self, before: &Ray, next: &Ray) -> bool {
         let step_rad = self.elevation_rad(next) - self.elevation_rad(before);
         let is_in_front = !self.is_behind(before) && !self.is_behind(next);
         is_in_front || step_rad.abs() <= FRAC_PI_4
@@ -126,7 +126,7 @@ struct Run<'r> {
     plane: Plane,
     /// Least and largest component across the plane.
     across: (f64, f64),
-    rays: Vec<&'r RayRow>,
+    rays: Vec<&'r Ray>,
 }
 
 impl<'r> Run<'r> {
@@ -139,21 +139,21 @@ impl<'r> Run<'r> {
     }
 
     /// Whether rays can follow its last one in its plane.
-    fn takes(&self, rays: &[&RayRow]) -> bool {
+    fn takes(&self, rays: &[&Ray]) -> bool {
         let (low, high) = self.across_with(rays);
         let ends = self.rays.last().zip(rays.first());
         let goes_on = ends.is_none_or(|(before, next)| self.plane.goes_on(before, next));
         goes_on && high - low <= SPREAD_RAD
     }
 
-    fn across_with(&self, rays: &[&RayRow]) -> (f64, f64) {
+    fn across_with(&self, rays: &[&Ray]) -> (f64, f64) {
         let across = rays.iter().map(|ray| self.plane.across(ray));
         across.fold(self.across, |(low, high), across| {
             (low.min(across), high.max(across))
         })
     }
 
-    fn add(&mut self, rays: &[&'r RayRow]) {
+    fn add(&mut self, rays: &[&'r Ray]) {
         self.across = self.across_with(rays);
         self.rays.extend(rays);
     }
@@ -174,7 +174,7 @@ impl<'r> Run<'r> {
         scans
     }
 
-    fn elevations_rad(&self, rays: &[&RayRow]) -> Vec<f64> {
+    fn elevations_rad(&self, rays: &[&Ray]) -> Vec<f64> {
         rays.iter()
             .map(|ray| self.plane.elevation_rad(ray))
             .collect()
@@ -185,7 +185,7 @@ impl<'r> Run<'r> {
 ///
 /// # Errors
 /// Elevations or velocities that are impossible, as of another unit; rays of all azimuths.
-pub(super) fn in_order(rays: Vec<RayRow>) -> Result<Split, String> {
+pub(super) fn in_order(rays: Vec<Ray>) -> Result<Split, String> {
     split(rays, |rays| {
         runs(rays).iter().flat_map(Run::scans).collect()
     })
@@ -195,7 +195,7 @@ pub(super) fn in_order(rays: Vec<RayRow>) -> Result<Split, String> {
 ///
 /// # Errors
 /// Elevations or velocities that are impossible, as of another unit; rays of all azimuths.
-pub(super) fn in_any_order(rays: Vec<RayRow>) -> Result<Split, String> {
+pub(super) fn in_any_order(rays: Vec<Ray>) -> Result<Split, String> {
     split(rays, by_plane)
 }
 
@@ -203,7 +203,7 @@ pub(super) fn in_any_order(rays: Vec<RayRow>) -> Result<Split, String> {
 ///
 /// # Errors
 /// As [`in_order`].
-pub(super) fn in_time(mut rays: Vec<RayRow>) -> Result<Split, String> {
+pub(super) fn in_time(mut rays: Vec<Ray>) -> Result<Split, String> {
     rays.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     in_order(rays)
 }
@@ -213,7 +213,7 @@ pub(super) fn in_time(mut rays: Vec<RayRow>) -> Result<Split, String> {
 ///
 /// # Errors
 /// As [`in_any_order`].
-pub(super) fn in_time_or_any_order(rays: Vec<RayRow>) -> Result<Split, String> {
+pub(super) fn in_time_or_any_order(rays: Vec<Ray>) -> Result<Split, String> {
     if rays.iter().all(|ray| ray.time_s.is_finite())
         && let Ok(found) = in_time(rays.clone())
         && cover_elevations_again(&found.0)
@@ -249,10 +249,7 @@ fn cover_elevations_again(scans: &[PlaneScan]) -> bool {
 }
 
 /// The scans that `find` makes of the possible rays.
-fn split(
-    mut rays: Vec<RayRow>,
-    find: impl FnOnce(&[RayRow]) -> Vec<PlaneScan>,
-) -> Result<Split, String> {
+fn split(mut rays: Vec<Ray>, find: impl FnOnce(&[Ray]) -> Vec<PlaneScan>) -> Result<Split, String> {
     let mut skipped = Vec::new();
     skipped.extend(drop_impossible(&mut rays)?);
     let velocities = rays.iter_mut().map(|ray| ray.velocity_m_s.as_mut_slice());
@@ -296,7 +293,7 @@ fn at_azimuths(scans: &[PlaneScan]) -> String {
     format!(" at azimuth {} degrees", azimuths.join(", "))
 }
 
-fn is_impossible(ray: &RayRow) -> bool {
+fn is_impossible(ray: &Ray) -> bool {
     !ray.elevation_rad.is_nan() && !ALLOWED_RAD.contains(&ray.elevation_rad)
 }
 
@@ -304,7 +301,7 @@ fn is_impossible(ray: &RayRow) -> bool {
 ///
 /// # Errors
 /// Fails if so many are impossible that the unit must be another one.
-fn drop_impossible(rays: &mut Vec<RayRow>) -> Result<Option<String>, String> {
+fn drop_impossible(rays: &mut Vec<Ray>) -> Result<Option<String>, String> {
     let all = rays.len();
     for ray in rays.iter_mut() {
         if (TAU - FRAC_PI_2..=TAU).contains(&ray.elevation_rad) {
@@ -327,7 +324,7 @@ fn drop_impossible(rays: &mut Vec<RayRow>) -> Result<Option<String>, String> {
 }
 
 /// Rays that follow each other in one plane, where they can be a scan; a few rays between two such are skipped.
-fn runs(rays: &[RayRow]) -> Vec<Run<'_>> {
+fn runs(rays: &[Ray]) -> Vec<Run<'_>> {
     let mut all: Vec<Run<'_>> = Vec::new();
     for (i, ray) in rays.iter().enumerate() {
         match all.last_mut().filter(|run| run.takes(&[ray])) {
@@ -360,7 +357,7 @@ fn runs(rays: &[RayRow]) -> Vec<Run<'_>> {
 }
 
 /// Rays of one side of a plane each, in the order in which they first come; both sides are one scan if both reach up to the zenith.
-fn by_plane(rays: &[RayRow]) -> Vec<PlaneScan> {
+fn by_plane(rays: &[Ray]) -> Vec<PlaneScan> {
     let mut sides: Vec<Run<'_>> = Vec::new();
     for ray in rays {
         match sides.iter_mut().find(|side| side.plane.has_in_front(ray)) {
@@ -388,12 +385,12 @@ fn by_plane(rays: &[RayRow]) -> Vec<PlaneScan> {
     scans
 }
 
-fn reaches_up(rays: &[&RayRow]) -> bool {
+fn reaches_up(rays: &[&Ray]) -> bool {
     rays.iter().any(|ray| ray.elevation_rad > FRAC_PI_4)
 }
 
 /// The scan of rays near a plane: its azimuth is their median, and those too far from it are skipped; none where no plane is theirs.
-fn in_one_plane(near: Plane, rays: &[&RayRow]) -> Option<PlaneScan> {
+fn in_one_plane(near: Plane, rays: &[&Ray]) -> Option<PlaneScan> {
     let directed = rays.iter().filter(|ray| is_directed(ray));
     let mut turns_rad: Vec<f64> = directed.map(|ray| near.front_turn_rad(ray)).collect();
     turns_rad.sort_by(f64::total_cmp);
@@ -405,8 +402,8 @@ fn in_one_plane(near: Plane, rays: &[&RayRow]) -> Option<PlaneScan> {
         .iter()
         .filter(|ray| plane.across(ray).abs() <= OFF_PLANE_RAD);
     let spread = extent(rays.clone().map(|ray| plane.across(ray)));
-    let rays: Vec<RayRow> = rays
-        .map(|ray| RayRow {
+    let rays: Vec<Ray> = rays
+        .map(|ray| Ray {
             elevation_rad: plane.elevation_rad(ray),
             ..(*ray).clone()
         })
@@ -427,12 +424,12 @@ fn extent(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Whether the azimuth of a ray is known and says something.
-fn is_directed(ray: &RayRow) -> bool {
+fn is_directed(ray: &Ray) -> bool {
     ray.azimuth_rad.is_finite() && ray.elevation_rad.cos().abs() > NEAR_ZENITH
 }
 
 /// Whether rays have enough elevations that differ.
-fn can_be_a_scan(rays: &[&RayRow]) -> bool {
+fn can_be_a_scan(rays: &[&Ray]) -> bool {
     let mut all: Vec<f64> = rays.iter().map(|ray| ray.elevation_rad).collect();
     all.sort_by(f64::total_cmp);
     all.dedup();
@@ -440,7 +437,7 @@ fn can_be_a_scan(rays: &[&RayRow]) -> bool {
 }
 
 /// Least and largest azimuth of rays, degrees, where they are of several planes; the largest may be above 360.
-fn azimuths_degrees(rays: &[RayRow]) -> Option<(f64, f64)> {
+fn azimuths_degrees(rays: &[Ray]) -> Option<(f64, f64)> {
     let first = Plane::first_of(rays);
     let directed = rays.iter().filter(|ray| is_directed(ray));
     let turns = directed.map(|ray| first.turn_rad(ray));

@@ -3,13 +3,13 @@ use ndarray::Array2;
 use wakescope_estimate::retrieval::ScanMap;
 
 /// Rays at azimuths and elevations in degrees; each has its number as time.
-fn rays(directions: impl IntoIterator<Item = (f64, f64)>) -> Vec<RayRow> {
-    let ray = |(i, (azimuth, elevation)): (usize, (f64, f64))| RayRow {
+fn rays(directions: impl IntoIterator<Item = (f64, f64)>) -> Vec<Ray> {
+    let ray = |(i, (azimuth, elevation)): (usize, (f64, f64))| Ray {
         elevation_rad: elevation.to_radians(),
         azimuth_rad: azimuth.to_radians(),
         time_s: i as f64,
         velocity_m_s: vec![1.0; 3],
-        sigma_m_s: Vec::new(),
+        ..Ray::default()
     };
     directions.into_iter().enumerate().map(ray).collect()
 }

@@ -6,7 +6,7 @@
 use super::grid::check_extent;
 use super::planes::ALLOWED_RAD;
 use super::velocities::drop_missing;
-use super::{ScanFormat, Text, cfradial, hpl, table};
+use super::{ScanFormat, cfradial, hpl, table};
 use crate::Error;
 use crate::io::netcdf_input::open_groups;
 use crate::io::{UtcTime, text_file};
@@ -30,7 +30,7 @@ pub struct Ray {
     pub elevation_rad: f64,
     /// Time of its middle, s; NaN if it is unknown.
     pub time_s: f64,
-    /// Ranges of its gates, m.
+    /// Ranges of its gates, m; empty while all rays of the file have the same.
     pub range_m: Vec<f64>,
     /// Velocities of its gates, m/s, positive away; NaN where there is none.
     pub velocity_m_s: Vec<f64>,
@@ -118,10 +118,11 @@ fn netcdf(path: &Path, format: &ScanFormat) -> Result<FoundRays, Error> {
 }
 
 fn of_text(bytes: &[u8], path: &Path, format: &ScanFormat) -> Result<FoundRays, String> {
-    match super::decoded(bytes, path)? {
-        Text::Hpl(_) if format.field.is_some() => Err(super::NO_FIELD.into()),
-        Text::Hpl(text) => hpl::rays_of_text(&text, path, format),
-        Text::Table(text) => table::rays_of_text(&text, path, format),
+    let text = super::decoded(bytes, path, format)?;
+    if super::is_hpl(&text) {
+        hpl::rays_of_text(&text, path, format)
+    } else {
+        table::rays_of_text(&text, path, format)
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Check: maps of a run, references, cells that are missing, twice there, or make no grid.
 
-use super::grid::{RayRow, mean_count, of_mean, scan_map};
+use super::grid::{mean_count, of_mean, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
 use crate::io::csv_input::TextTable;
@@ -366,7 +366,7 @@ fn column_names(table: &TextTable) -> String {
 
 /// The rays of one sweep on the ranges of all, in the order in which they first come. Rows of one direction are one ray, or with
 /// `at_one_time` those of one direction and time.
-fn grid(rows: &[TableVelocity], at_one_time: bool) -> Result<(Vec<RayRow>, Vec<f64>), String> {
+fn grid(rows: &[TableVelocity], at_one_time: bool) -> Result<(Vec<Ray>, Vec<f64>), String> {
     let range_m = axis(rows.iter().map(|row| row.range_m).collect());
     let elevation_rad = axis(rows.iter().map(|row| row.elevation_rad).collect());
     let gates = range_m.len();
@@ -387,7 +387,7 @@ fn grid(rows: &[TableVelocity], at_one_time: bool) -> Result<(Vec<RayRow>, Vec<f
         ));
     }
     let has_sigma = rows.iter().any(|row| row.sigma_m_s.is_some());
-    let empty = RayRow {
+    let empty = Ray {
         elevation_rad: f64::NAN,
         azimuth_rad: f64::NAN,
         time_s: f64::NAN,
@@ -397,6 +397,7 @@ fn grid(rows: &[TableVelocity], at_one_time: bool) -> Result<(Vec<RayRow>, Vec<f
         } else {
             Vec::new()
         },
+        ..Ray::default()
     };
     let mut rays = vec![empty; lines];
     let mut seen = vec![false; gates * lines];

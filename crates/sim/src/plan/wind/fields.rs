@@ -5,10 +5,11 @@
 
 use crate::Error;
 use crate::beams::direction::sin_cos_of_turn;
-use crate::io::fields_input::{FieldPlace, places, read};
+use crate::io::fields_input::{places, read};
 use crate::io::planes_input::files;
 use crate::plan::wind::SceneWind;
 use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
+use std::path::Path;
 use std::sync::Arc;
 use wakescope_les::winds::{Edges, Series, Side, VolumeComponent, VolumeSnapshot};
 use wakescope_les::{Error as LesError, Wind};
@@ -83,21 +84,18 @@ impl Wind for Placed {
     }
 }
 
-/// A field in metres and seconds.
-fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Error> {
+/// The field at a place along the time of a file, in metres and seconds.
+fn snapshot(path: &Path, place: Option<usize>, flow: &FieldFlow) -> Result<VolumeSnapshot, Error> {
     let scaled = |c: VolumeComponent, unit: f64| VolumeComponent {
         nodes_m: c
             .nodes_m
             .map(|nodes| nodes.into_iter().map(|x| x * flow.length_unit_m).collect()),
         values: c.values.into_iter().map(|v| v * unit).collect(),
     };
-    let (components, stated_m) = read(field, &flow.names)?;
+    let (components, stated_m) = read(path, place, &flow.names)?;
     let mut components = components.map(|c| scaled(c, flow.velocity_unit_m_s));
     let stated_m = stated_m.map(|stated| stated.map(|period_m| period_m * flow.length_unit_m));
-    let refuse = |reason: String| Error::Input {
-        path: field.path.clone(),
-        reason,
-    };
+    let refuse = |reason: String| Error::input(path, reason);
     let low = match flow.ground {
         FieldGround::Open => Side::Open,
         FieldGround::NoSlip => Side::NoSlipWall {
@@ -202,19 +200,23 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
         reason,
     };
     let mut all = Vec::new();
+    let mut times_s = Vec::new();
+    let mut start = None;
     for path in files(&path).map_err(of_key)? {
-        all.extend(places(&path, &flow.names[0]).map_err(of_key)?);
+        let (of_file, reference) = places(&path, &flow.names[0]).map_err(of_key)?;
+        if all.is_empty() {
+            start = reference;
+        }
+        // Files may count from dates of their own.
+        let later_s = match (start, reference) {
+            (Some(start), Some(own)) => own.seconds_since(start),
+            _ => 0.0,
+        };
+        for (place, time_s) in of_file {
+            all.push((path.clone(), place));
+            times_s.push(time_s * flow.length_unit_m / flow.velocity_unit_m_s + later_s);
+        }
     }
-    // Files may count from dates of their own.
-    let start = all.first().and_then(|field| field.reference);
-    let later_s = |field: &FieldPlace| match (start, field.reference) {
-        (Some(start), Some(own)) => own.seconds_since(start),
-        _ => 0.0,
-    };
-    let times_s: Vec<f64> = all
-        .iter()
-        .map(|f| f.time_s * flow.length_unit_m / flow.velocity_unit_m_s + later_s(f))
-        .collect();
     let (Some(&first_s), Some(&last_s)) = (times_s.first(), times_s.last()) else {
         return Err(refuse("no field at all".into()));
     };
@@ -239,8 +241,8 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
         let after = i.checked_sub(1).and_then(|i| times_s.get(i));
         before.is_none_or(|t| *t > ends_s[0]) && after.is_none_or(|t| *t < ends_s[1])
     };
-    for (_, field) in all.iter().enumerate().filter(|(i, _)| used(*i)) {
-        let snapshot = snapshot(field, flow).map_err(of_key)?;
+    for (_, (path, place)) in all.iter().enumerate().filter(|(i, _)| used(*i)) {
+        let snapshot = snapshot(path, *place, flow).map_err(of_key)?;
         steepest_per_s = steepest_per_s.max(snapshot.max_gradient_per_s(0.0));
         fastest_m_s = fastest_m_s.max(snapshot.max_speed_m_s());
     }
@@ -251,18 +253,18 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
     );
     let own = flow.clone();
     let reader = move |i: usize| {
-        let field = all.get(i).ok_or(LesError::OutOfRange {
+        let (path, place) = all.get(i).ok_or(LesError::OutOfRange {
             field: "field",
             value: i as f64,
             allowed: "in the series",
         })?;
         let unreadable = |e: Error| LesError::File {
             action: "read",
-            path: field.path.clone(),
+            path: path.clone(),
             kind: std::io::ErrorKind::InvalidData,
             reason: e.to_string(),
         };
-        snapshot(field, &own).map_err(unreadable)
+        snapshot(path, *place, &own).map_err(unreadable)
     };
     let series = Series::read(times_s.clone(), steepest_per_s, reader)
         .map_err(|e| refuse(format!("the times of the fields: {e}")))?;
