@@ -9,7 +9,7 @@ use wakescope_estimate::{
     spectrum::unweighted_lags,
     window::SPEED_OF_LIGHT_M_S,
 };
-use wakescope_signal::{GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, Simulator};
+use wakescope_signal::{GaussianPulse, LineOfSight, NoiseModel, Record, Simulator};
 
 const SPEED_M_S: f64 = 3.0;
 const SNR_DB: f64 = 20.0;
@@ -27,7 +27,7 @@ struct Target {
 /// A layer in the middle of the window whose return, averaged over the window, is [`SNR_DB`] above the noise.
 fn target() -> Target {
     let receiver = receiver(NoiseModel::White);
-    let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), ENERGY_J).unwrap();
+    let pulse = GaussianPulse::of_full_width(200e-9, ENERGY_J).unwrap();
     let first_s = 2.0 * 400.0 / SPEED_OF_LIGHT_M_S;
     let record = Record {
         time_of_first_sample_s: first_s,

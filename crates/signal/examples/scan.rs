@@ -162,8 +162,7 @@ fn main() -> Result<(), Error> {
         println!("{distance_m:12.1}  {gate_m_s:6.2}  {expected_m_s:22.2}  {found_m_s:10.2}");
     }
     println!(
-        "{} of {} parts of samples clipped",
-        clipped.total(),
+        "{clipped} of {} parts of samples clipped",
         2 * scan.records() * SAMPLES
     );
     Ok(())

@@ -14,29 +14,6 @@ pub struct Digitiser {
     half: f64,
 }
 
-/// Samples beyond full scale.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Clipped {
-    /// Samples set to the lowest code.
-    pub low: u64,
-    /// Samples set to the highest code.
-    pub high: u64,
-}
-
-impl Clipped {
-    /// Number of samples that were clipped.
-    pub fn total(self) -> u64 {
-        self.low + self.high
-    }
-}
-
-impl std::ops::AddAssign for Clipped {
-    fn add_assign(&mut self, other: Self) {
-        self.low += other.low;
-        self.high += other.high;
-    }
-}
-
 impl Digitiser {
     /// A converter of `bits` for currents from `-full_scale_a` to `full_scale_a`.
     ///
@@ -66,12 +43,12 @@ impl Digitiser {
         self.step_a
     }
 
-    /// Replaces each current by that of its code, and counts those beyond full scale. Complex
-    /// samples have a converter for each part.
+    /// Replaces each current by that of its code, and returns how many were clipped, being beyond
+    /// full scale. Complex samples have a converter for each part.
     ///
     /// # Errors
     /// [`Error::ElementOutOfRange`] with the first sample that is NaN; then nothing was changed.
-    pub fn digitise<T: Sample>(&self, samples_a: &mut [T]) -> Result<Clipped, Error> {
+    pub fn digitise<T: Sample>(&self, samples_a: &mut [T]) -> Result<u64, Error> {
         let mut bad = None;
         for (index, sample) in samples_a.iter_mut().enumerate() {
             sample.for_each_part(|part| {
@@ -88,14 +65,13 @@ impl Digitiser {
                 allowed: "a number",
             });
         }
-        let mut clipped = Clipped::default();
+        let mut clipped = 0;
         for sample in samples_a {
             sample.for_each_part(|part| {
                 // Before and after saturation.
                 let code = (*part / self.step_a).round_ties_even();
                 let kept = code.clamp(-self.half, self.half - 1.0);
-                clipped.low += u64::from(code < kept);
-                clipped.high += u64::from(code > kept);
+                clipped += u64::from(code != kept);
                 *part = kept * self.step_a;
             });
         }
@@ -118,10 +94,7 @@ mod tests {
                 .map(|k| amplitude_a * (0.737_123 * f64::from(k)).sin())
                 .collect();
             let mut digital = tone.clone();
-            assert_eq!(
-                digitiser.digitise(&mut digital).unwrap(),
-                Clipped::default()
-            );
+            assert_eq!(digitiser.digitise(&mut digital).unwrap(), 0);
             let error: f64 = tone
                 .iter()
                 .zip(&digital)
@@ -154,12 +127,12 @@ mod tests {
                 -4.0, -4.0, -4.0, -4.0, 0.0, 0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0
             ]
         );
-        assert_eq!((clipped, clipped.total()), (Clipped { low: 2, high: 2 }, 4));
+        assert_eq!(clipped, 4);
         let mut others = [f64::INFINITY, -2.2];
         digitiser.digitise(&mut others).unwrap();
         assert_eq!(others, [3.0, -2.0]);
         let mut pair = [Complex::new(9.0, -1.2)];
-        assert_eq!(digitiser.digitise(&mut pair).unwrap().total(), 1);
+        assert_eq!(digitiser.digitise(&mut pair).unwrap(), 1);
         assert_eq!(pair[0], Complex::new(3.0, -1.0));
     }
 

@@ -91,7 +91,7 @@ pub use filter::RangeFilter;
 pub use heterodyne::{Scratch, Simulator};
 pub use line::{LayerLimits, LineOfSight};
 pub use medium::Medium;
-pub use pulse::{GaussianPulse, Pulse, PulseDuration};
+pub use pulse::{GaussianPulse, Pulse};
 pub use receiver::{NoiseModel, Receiver};
 pub use record::Record;
 pub use sample::Sample;

@@ -23,25 +23,6 @@ const ALLOWED_ENERGY_ERROR: f64 = 5e-3;
 /// Largest error of the energy in a sum over layers of the advised thickness.
 const ADVISED_ENERGY_ERROR: f64 = 5e-4;
 
-/// The two usual meanings of "pulse duration", both of the power `|f|^2`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum PulseDuration {
-    /// Full width at half maximum \[s\]: `2 sqrt(ln 2) sigma` = 1.665 `sigma`.
-    FullWidthHalfMaximum(f64),
-    /// Half the width between the points at 1/e \[s\]: `sigma` itself.
-    OneOverEHalfWidth(f64),
-}
-
-impl PulseDuration {
-    /// The 1/e half-width of the power, `sigma` of (7) \[s\].
-    pub fn sigma_s(self) -> f64 {
-        match self {
-            Self::FullWidthHalfMaximum(width_s) => width_s / (2.0 * 2.0_f64.ln().sqrt()),
-            Self::OneOverEHalfWidth(half_width_s) => half_width_s,
-        }
-    }
-}
-
 /// A transmitted pulse with the Gaussian envelope (7).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaussianPulse {
@@ -54,22 +35,32 @@ impl GaussianPulse {
     /// chapter's two pulses.
     pub fn table2() -> Self {
         Self {
-            sigma_s: PulseDuration::FullWidthHalfMaximum(200e-9).sigma_s(),
+            sigma_s: Self::sigma_of_full_width_s(200e-9),
             energy_j: 150e-6,
         }
     }
 
-    /// A pulse of the given duration and energy.
+    /// A pulse of the given half-width of the power at 1/e, `sigma` of (7), and energy.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] if the duration or the energy is not finite and positive.
-    pub fn new(duration: PulseDuration, energy_j: f64) -> Result<Self, Error> {
-        check_positive("pulse duration_s", duration.sigma_s())?;
+    /// [`Error::OutOfRange`] if the half-width or the energy is not finite and positive.
+    pub fn new(sigma_s: f64, energy_j: f64) -> Result<Self, Error> {
+        check_positive("pulse duration_s", sigma_s)?;
         check_positive("energy_j", energy_j)?;
-        Ok(Self {
-            sigma_s: duration.sigma_s(),
-            energy_j,
-        })
+        Ok(Self { sigma_s, energy_j })
+    }
+
+    /// A pulse of the given full width at half maximum of the power, the usual "pulse duration", and energy.
+    ///
+    /// # Errors
+    /// As [`GaussianPulse::new`].
+    pub fn of_full_width(full_width_s: f64, energy_j: f64) -> Result<Self, Error> {
+        Self::new(Self::sigma_of_full_width_s(full_width_s), energy_j)
+    }
+
+    /// The 1/e half-width, `sigma` \[s\], of a full width at half maximum `2 sqrt(ln 2) sigma` = 1.665 `sigma`.
+    pub fn sigma_of_full_width_s(full_width_s: f64) -> f64 {
+        full_width_s / (2.0 * 2.0_f64.ln().sqrt())
     }
 
     /// The 1/e half-width of the power, `sigma` \[s\].
@@ -439,7 +430,7 @@ mod tests {
 
     #[test]
     fn power_is_one_over_e_at_the_stated_half_width() {
-        let pulse = GaussianPulse::new(PulseDuration::OneOverEHalfWidth(80e-9), 1.0).unwrap();
+        let pulse = GaussianPulse::new(80e-9, 1.0).unwrap();
         let ratio = pulse.intensity_per_s(-80e-9) / pulse.intensity_per_s(0.0);
         assert_relative_eq!(ratio, (-1.0_f64).exp(), max_relative = 1e-14);
     }
@@ -476,7 +467,7 @@ mod tests {
     #[test]
     fn durations_and_energies_that_are_not_positive_are_refused() {
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            let duration = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(bad), 1.0);
+            let duration = GaussianPulse::of_full_width(bad, 1.0);
             assert!(matches!(
                 duration,
                 Err(Error::OutOfRange {
@@ -484,7 +475,7 @@ mod tests {
                     ..
                 })
             ));
-            let energy = GaussianPulse::new(PulseDuration::OneOverEHalfWidth(1e-7), bad);
+            let energy = GaussianPulse::new(1e-7, bad);
             assert!(matches!(
                 energy,
                 Err(Error::OutOfRange {
@@ -568,7 +559,7 @@ mod tests {
     #[test]
     fn advised_layers_hold_the_energy_of_every_shape() {
         let box_shaped = rectangle(200e-9, 1e-9);
-        let short = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(2e-9), 1e-4).unwrap();
+        let short = GaussianPulse::of_full_width(2e-9, 1e-4).unwrap();
         for pulse in [gaussian().into(), short.into(), skewed(), box_shaped] {
             let thickness_m = pulse.layer_thickness_m(limits(0.0)).unwrap();
             assert!(thickness_m <= pulse.max_layer_thickness_m());

@@ -11,7 +11,7 @@ use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::digitise::{Clipped, Digitiser};
+use crate::digitise::Digitiser;
 use crate::parallel::map_chunks;
 use crate::{Error, Sample, Scratch, Shot, Simulator};
 
@@ -90,9 +90,9 @@ where
     pub fn for_each<T: Sample, E: From<Error>>(
         &self,
         mut sink: impl FnMut(PulseKey, &[T]) -> Result<(), E>,
-    ) -> Result<Clipped, E> {
+    ) -> Result<u64, E> {
         let samples = self.simulator.record().samples;
-        let mut clipped = Clipped::default();
+        let mut clipped = 0;
         let mut batch_a = vec![T::default(); samples * BATCH.min(self.records())];
         for first in (0..self.records()).step_by(BATCH) {
             let count = BATCH.min(self.records() - first);
@@ -111,7 +111,7 @@ where
     ///
     /// # Errors
     /// As [`Scan::for_each`].
-    pub fn collect<T: Sample>(&self) -> Result<(Array2<T>, Clipped), Error> {
+    pub fn collect<T: Sample>(&self) -> Result<(Array2<T>, u64), Error> {
         let mut records_a = Array2::from_elem(
             (self.records(), self.simulator.record().samples),
             T::default(),
@@ -119,7 +119,7 @@ where
         let made = records_a
             .as_slice_mut()
             .map_or_else(Vec::new, |rows| self.make(0, rows));
-        let mut clipped = Clipped::default();
+        let mut clipped = 0;
         for result in made {
             clipped += result?;
         }
@@ -134,7 +134,7 @@ where
     }
 
     /// Makes the records from `first` on, in parallel.
-    fn make<T: Sample>(&self, first: usize, rows_a: &mut [T]) -> Vec<Result<Clipped, Error>> {
+    fn make<T: Sample>(&self, first: usize, rows_a: &mut [T]) -> Vec<Result<u64, Error>> {
         map_chunks(
             rows_a,
             self.simulator.record().samples,
@@ -147,9 +147,8 @@ where
                     scratch,
                     out_a,
                 )?;
-                self.digitiser.map_or(Ok(Clipped::default()), |digitiser| {
-                    digitiser.digitise(out_a)
-                })
+                self.digitiser
+                    .map_or(Ok(0), |digitiser| digitiser.digitise(out_a))
             },
         )
     }

@@ -22,8 +22,7 @@ use wakescope_estimate::{Correlogram, Refinement, SignalKind, SpectralPeak, Weig
 use wakescope_optics::{Focus, Grid, Layers, MonteCarlo, Stop, Telescope, theory};
 use wakescope_signal::literal::literal_envelope;
 use wakescope_signal::{
-    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, SPEED_OF_LIGHT_M_S, Scratch,
-    Simulator,
+    GaussianPulse, LineOfSight, NoiseModel, Record, SPEED_OF_LIGHT_M_S, Scratch, Simulator,
 };
 use wakescope_sim::plot::Axis;
 
@@ -120,7 +119,7 @@ pub(super) fn phasors() -> Result<Vec<Panel>, Failure> {
 /// The receiver without noise, from one of the samples on.
 fn simulator(from: usize, samples: usize) -> Result<Simulator, Failure> {
     let receiver = receiver(NoiseModel::None);
-    let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(PULSE_S), ENERGY_J)?;
+    let pulse = GaussianPulse::of_full_width(PULSE_S, ENERGY_J)?;
     let record = Record {
         time_of_first_sample_s: 2.0 * FIRST_M / SPEED_OF_LIGHT_M_S
             + from as f64 / receiver.sample_rate_hz,

@@ -20,8 +20,7 @@ use wakescope_optics::screens::{Real, ScreenGenerator};
 use wakescope_optics::{Grid, Layers, Misalignment, MonteCarlo, Telescope, Turbulence, theory};
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
-    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, SPEED_OF_LIGHT_M_S, Scratch,
-    Simulator,
+    GaussianPulse, LineOfSight, NoiseModel, Record, SPEED_OF_LIGHT_M_S, Scratch, Simulator,
 };
 
 pub(super) const SEED: u64 = 1;
@@ -224,7 +223,7 @@ fn taylor_green(profile: Profile) -> Result<Vec<Row>, Failure> {
 const FIRST_M: f64 = 340.0;
 
 fn simulator(pulse_s: f64, samples: usize) -> Result<Simulator, Failure> {
-    let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(pulse_s), ENERGY_J)?;
+    let pulse = GaussianPulse::of_full_width(pulse_s, ENERGY_J)?;
     let record = Record {
         time_of_first_sample_s: 2.0 * FIRST_M / SPEED_OF_LIGHT_M_S,
         samples,

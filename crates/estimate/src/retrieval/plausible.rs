@@ -10,47 +10,12 @@ use crate::vortex_fit::WakeModel;
 /// Largest spacing of the vortices of an aircraft in service \[m\]: pi/4 of a span of 80 m.
 const SPACING_M: f64 = 63.0;
 
-/// A quantity of a vortex, and its limit.
-struct Limit {
-    quantity: &'static str,
-    unit: &'static str,
-    value: fn(&VortexResult, &ScanMap, &WakeModel) -> f64,
-    allowed: std::ops::RangeInclusive<f64>,
-    reason: &'static str,
-}
-
-/// Everything that a vortex must meet.
-const LIMITS: [Limit; 4] = [
-    Limit {
-        quantity: "circulation",
-        unit: "m^2/s",
-        value: |vortex, _, _| vortex.circulation_m2_s.value,
-        allowed: f64::NEG_INFINITY..=2000.0,
-        // weight / (density x spacing x speed): A380 at 395 t and 75 m/s 670, at 560 t in cruise 950
-        reason: "twice that of the largest aircraft in cruise",
-    },
-    Limit {
-        quantity: "core radius",
-        unit: "m",
-        value: |vortex, _, _| vortex.core_radius_m.map_or(0.0, |core| core.value),
-        allowed: f64::NEG_INFINITY..=0.5 * SPACING_M,
-        reason: "half the spacing of the vortices of the largest aircraft",
-    },
-    Limit {
-        quantity: "height",
-        unit: "m",
-        value: |vortex, _, _| vortex.height_m.value,
-        allowed: f64::NEG_INFINITY..=20_000.0,
-        reason: "above the ceiling of all aircraft that carry passengers",
-    },
-    Limit {
-        quantity: "number of velocities within 63 m",
-        unit: "",
-        value: |vortex, map, model| velocities_about(vortex, map, model) as f64,
-        allowed: 10.0..=f64::INFINITY,
-        reason: "fewer do not resolve the vortices of the largest aircraft",
-    },
-];
+/// Largest circulation \[m^2/s\]. Weight / (density x spacing x speed) of an A380 at 395 t and 75 m/s is 670, at 560 t in cruise 950.
+const CIRCULATION_M2_S: f64 = 2000.0;
+/// Largest height \[m\].
+const HEIGHT_M: f64 = 20_000.0;
+/// Fewest velocities within the largest spacing of a vortex.
+const VELOCITIES: usize = 10;
 
 /// Velocities of a map within the largest spacing of a vortex.
 fn velocities_about(vortex: &VortexResult, map: &ScanMap, model: &WakeModel) -> usize {
@@ -86,32 +51,46 @@ pub fn without_implausible_vortices(
 
 /// The first limit that a vortex violates, in words.
 fn violated_limit(vortex: &VortexResult, map: &ScanMap, model: &WakeModel) -> Option<String> {
-    LIMITS.iter().find_map(|limit| {
-        let value = (limit.value)(vortex, map, model);
-        (!limit.allowed.contains(&value)).then(|| limit.in_words(value))
-    })
-}
-
-impl Limit {
-    fn in_words(&self, value: f64) -> String {
-        let low = self.allowed.start();
-        let high = self.allowed.end();
-        let allowed = if high.is_finite() {
-            format!("at most {high}")
-        } else {
-            format!("at least {low}")
-        };
-        let unit = if self.unit.is_empty() {
-            String::new()
-        } else {
-            format!(" {}", self.unit)
-        };
-        let value = value.round();
-        format!(
-            "the {} of a vortex is {value}{unit}: {allowed}{unit} is allowed, {}",
-            self.quantity, self.reason
-        )
+    let core_radius_m = vortex.core_radius_m.map_or(0.0, |core| core.value);
+    for (quantity, unit, value, most, reason) in [
+        (
+            "circulation",
+            "m^2/s",
+            vortex.circulation_m2_s.value,
+            CIRCULATION_M2_S,
+            "twice that of the largest aircraft in cruise",
+        ),
+        (
+            "core radius",
+            "m",
+            core_radius_m,
+            0.5 * SPACING_M,
+            "half the spacing of the vortices of the largest aircraft",
+        ),
+        (
+            "height",
+            "m",
+            vortex.height_m.value,
+            HEIGHT_M,
+            "above the ceiling of all aircraft that carry passengers",
+        ),
+    ] {
+        // also of NaN
+        let is_within = value <= most;
+        if !is_within {
+            let value = value.round();
+            return Some(format!(
+                "the {quantity} of a vortex is {value} {unit}: at most {most} {unit} is allowed, {reason}"
+            ));
+        }
     }
+    let velocities = velocities_about(vortex, map, model);
+    (velocities < VELOCITIES).then(|| {
+        format!(
+            "the number of velocities within {SPACING_M} m of a vortex is {velocities}: at least {VELOCITIES} is allowed, \
+             fewer do not resolve the vortices of the largest aircraft"
+        )
+    })
 }
 
 #[cfg(test)]

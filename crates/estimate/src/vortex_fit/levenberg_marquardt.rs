@@ -19,15 +19,6 @@ pub(crate) struct Normal {
 /// With a secant curvature, longer steps than this many standard deviations are cut short.
 const LONGEST_SIGMAS: f64 = 4.0;
 
-/// Where the curvature of the cost comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Curvature {
-    /// From the derivatives at each point.
-    Exact,
-    /// From the changes of the gradient between points (a quasi-Newton update), so that a rejected step improves it too.
-    Secant,
-}
-
 /// When an iteration stops.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StoppingRule {
@@ -35,7 +26,9 @@ pub(crate) struct StoppingRule {
     pub(crate) iterations: usize,
     /// The step that remains, in standard deviations of the fit.
     pub(crate) sigmas: f64,
-    pub(crate) curvature: Curvature,
+    /// Whether the curvature of the cost comes from the changes of the gradient between points (a quasi-Newton update), so that a rejected step
+    /// improves it too; else it comes from the derivatives at each point.
+    pub(crate) is_secant: bool,
 }
 
 impl StoppingRule {
@@ -44,7 +37,7 @@ impl StoppingRule {
         Self {
             iterations,
             sigmas,
-            curvature: Curvature::Exact,
+            is_secant: false,
         }
     }
 }
@@ -88,7 +81,6 @@ pub(crate) fn levenberg_marquardt<P: Clone>(
     mut evaluate: impl FnMut(&P) -> Option<Normal>,
     moved: impl Fn(&P, &[f64]) -> P,
 ) -> Option<Minimum<P>> {
-    let is_secant = stop.curvature == Curvature::Secant;
     let mut at = start;
     let mut normal = evaluate(&at)?;
     let mut damping = 1e-3;
@@ -106,7 +98,7 @@ pub(crate) fn levenberg_marquardt<P: Clone>(
         let mut step = damped_step(&normal, &down, damping);
         if let Some(step) = step
             .as_mut()
-            .filter(|_| is_secant && sigmas_left > LONGEST_SIGMAS)
+            .filter(|_| stop.is_secant && sigmas_left > LONGEST_SIGMAS)
         {
             step.iter_mut()
                 .for_each(|s| *s *= LONGEST_SIGMAS / sigmas_left);
@@ -127,7 +119,7 @@ pub(crate) fn levenberg_marquardt<P: Clone>(
                 normal = trial_normal;
             }
             (_, rejected) => {
-                if let Some(rejected) = rejected.filter(|_| is_secant) {
+                if let Some(rejected) = rejected.filter(|_| stop.is_secant) {
                     normal.curvature = rejected.curvature;
                 }
                 damping = (damping * 10.0).max(1e-4);

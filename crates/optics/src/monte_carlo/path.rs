@@ -111,30 +111,24 @@ fn same(a: f64, b: f64) -> bool {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Leg {
     pub(crate) screen: Option<usize>,
-    /// A range that the leg passes.
-    pub(crate) tap: Option<Tap>,
+    /// Index of the distance to a range that the leg passes, the first of `outputs`: one forward
+    /// transform serves it and the end of the leg.
+    pub(crate) tap: Option<usize>,
     /// Index of the distance of a step.
     pub(crate) distance: usize,
     /// Number of equal steps.
     pub(crate) times: usize,
-    /// Ranges at the end.
+    /// Ranges that it reaches, all at the end but the one that it passes.
     pub(crate) outputs: Range<usize>,
-}
-
-/// A range that a leg passes: one forward transform serves it and the end of the leg.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Tap {
-    pub(crate) range: usize,
-    /// Index of the distance to it.
-    pub(crate) distance: usize,
 }
 
 impl Leg {
     /// Ranges that the leg reaches: index, and whether the leg passes it.
     pub(crate) fn ranges(&self) -> impl Iterator<Item = (usize, bool)> {
-        let passed = self.tap.iter().map(|tap| (tap.range, true));
-        let at_the_end = self.outputs.clone().map(|output| (output, false));
-        passed.chain(at_the_end)
+        let passed = self.tap.map(|_| self.outputs.start);
+        self.outputs
+            .clone()
+            .map(move |output| (output, passed == Some(output)))
     }
 
     /// Whether the leg is one step to one range.
@@ -262,16 +256,13 @@ impl Path {
                 continue;
             };
             let whole_m = self.distance_m[before.distance] + self.distance_m[leg.distance];
-            let tap = Tap {
-                range: before.outputs.start,
-                distance: before.distance,
-            };
             let distance = self.index_of_distance(whole_m);
             self.legs.push(Leg {
                 screen: before.screen,
-                tap: Some(tap),
+                tap: Some(before.distance),
                 distance,
-                ..leg
+                times: leg.times,
+                outputs: before.outputs.start..leg.outputs.end,
             });
         }
     }
@@ -332,17 +323,11 @@ mod tests {
             let mut at = 0.0;
             let mut seen = 0;
             for leg in &p.legs {
-                if let Some(Tap {
-                    range: output,
-                    distance,
-                }) = leg.tap
-                {
-                    assert!((at + p.distance_m[distance] - range_m[output]).abs() < 1e-9);
-                    seen += 1;
-                }
+                let passed = leg.tap.map(|distance| at + p.distance_m[distance]);
                 at += p.distance_m[leg.distance] * leg.times as f64;
-                for output in leg.outputs.clone() {
-                    assert!((at - range_m[output]).abs() < 1e-9);
+                for (output, is_passed) in leg.ranges() {
+                    let output_m = if is_passed { passed.unwrap() } else { at };
+                    assert!((output_m - range_m[output]).abs() < 1e-9);
                     seen += 1;
                 }
             }

@@ -294,7 +294,7 @@ impl<'a, T: Real> Walker<'a, T> {
         for beam in (0..current.fields.len()).rev() {
             let field = &mut current.fields[beam];
             if let Some(tap) = leg.tap {
-                let steps = [&transfers[tap.distance], step];
+                let steps = [&transfers[tap], step];
                 [passed.power, current.power] = propagator.step_with_tap(
                     field,
                     &mut passed.fields[beam],

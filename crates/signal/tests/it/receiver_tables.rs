@@ -4,7 +4,7 @@ use approx::assert_relative_eq;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::receiver::phase_noise::{mean_frequency_sd_m_s, peak_variance_factor};
 use wakescope_signal::receiver::{Clipping, Converter, FrontEnd};
-use wakescope_signal::{Error, GaussianPulse, Pulse, PulseDuration, Receiver, SPEED_OF_LIGHT_M_S};
+use wakescope_signal::{Error, GaussianPulse, Pulse, Receiver, SPEED_OF_LIGHT_M_S};
 
 /// The rows of a stored table.
 fn rows<const N: usize>(name: &str) -> Vec<[f64; N]> {
@@ -285,9 +285,7 @@ fn the_reflex_and_the_pulse_before_are_the_stored_ones() {
         range_m,
     ] in rows::<8>("reflex")
     {
-        let pulse = Pulse::from(
-            GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(fwhm_s), energy_j).unwrap(),
-        );
+        let pulse = Pulse::from(GaussianPulse::of_full_width(fwhm_s, energy_j).unwrap());
         let reflection = 10f64.powf(0.1 * reflection_db);
         let receiver = Receiver {
             bandwidth_hz,

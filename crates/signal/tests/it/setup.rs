@@ -5,8 +5,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_signal::{
-    GaussianPulse, LayerLimits, LineOfSight, NoiseModel, Pulse, PulseDuration, Receiver, Record,
-    Scratch, Simulator,
+    GaussianPulse, LayerLimits, LineOfSight, NoiseModel, Pulse, Receiver, Record, Scratch,
+    Simulator,
 };
 
 pub(crate) const C: f64 = 299_792_458.0;
@@ -33,7 +33,7 @@ pub(crate) fn limits(max_gradient_per_s: f64) -> LayerLimits {
 }
 
 pub(crate) fn gaussian(width_s: f64) -> GaussianPulse {
-    GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(width_s), 150e-6).unwrap()
+    GaussianPulse::of_full_width(width_s, 150e-6).unwrap()
 }
 
 /// A pulse with a rise of 40 ns, a long tail and a phase that is no chirp, about its centroid.

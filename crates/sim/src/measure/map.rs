@@ -21,7 +21,6 @@ use wakescope_estimate::{
     window::Sample,
 };
 use wakescope_signal::RangeFilter;
-use wakescope_signal::digitise::Clipped;
 
 /// Estimates of the radial velocity and their errors, each \[line, gate\].
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -289,7 +288,7 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::Sample>(
                     .iter_mut()
                     .try_for_each(|sums| sums.add_products(first_line, products))?)
             })?;
-            Ok(Clipped::default())
+            Ok(0)
         };
         return of_sums(plans, scanner, observer, drawn, seen);
     }
@@ -322,7 +321,7 @@ pub(crate) fn of_sums<S: Sample>(
     plans: &[&Plan],
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
-    mut add: impl FnMut(usize, &mut [WindowSums<'_, S>]) -> Result<Clipped, Error>,
+    mut add: impl FnMut(usize, &mut [WindowSums<'_, S>]) -> Result<u64, Error>,
     mut seen: impl FnMut(&RealisationMap<'_>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let Some(plan) = plans.first() else {
@@ -332,7 +331,7 @@ pub(crate) fn of_sums<S: Sample>(
         .iter()
         .map(|plan| Mapper::new(plan, scanner))
         .collect::<Result<_, _>>()?;
-    let mut clipped = Clipped::default();
+    let mut clipped = 0_u64;
     observer.begin(
         Stage::Estimates,
         (plan.realisations() * plan.geometry.elevation_rad.len()) as u64,
@@ -361,7 +360,7 @@ pub(crate) fn of_sums<S: Sample>(
     // The real numbers that the converter sees.
     let samples =
         plan.realisations() * scanner.pulses() * plan.geometry.samples * S::KIND.lag_numbers(1);
-    let clipped_fraction = clipped.total() as f64 / (samples as f64).max(1.0);
+    let clipped_fraction = clipped as f64 / (samples as f64).max(1.0);
     mappers
         .into_iter()
         .zip(plans)

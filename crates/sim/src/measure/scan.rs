@@ -18,7 +18,6 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 use wakescope_signal::Sample;
-use wakescope_signal::digitise::Clipped;
 use wakescope_signal::efficiency::LayerEfficiency;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::scan::PulseKey;
@@ -215,7 +214,7 @@ impl<'a> Scanner<'a> {
         realisation: usize,
         observer: &dyn Observer,
         mut sink: impl FnMut(usize, ArrayView2<'_, T>) -> Result<(), Error>,
-    ) -> Result<Clipped, Error> {
+    ) -> Result<u64, Error> {
         let mut size = records_at_once::<T>(self.simulator.record().samples, self.pulses());
         let own = self.own_air(realisation)?;
         let air = own.as_ref().unwrap_or(&self.air);
@@ -225,7 +224,7 @@ impl<'a> Scanner<'a> {
             size =
                 size.min((WINDS_BYTES as usize / (16 * layers)).max(rayon::current_num_threads()));
         }
-        let mut clipped = Clipped::default();
+        let mut clipped = 0_u64;
         for first in (0..self.pulses()).step_by(size) {
             let last = (first + size).min(self.pulses());
             let (records, here) = self.piece(realisation, air, first..last, observer)?;
@@ -255,7 +254,7 @@ impl<'a> Scanner<'a> {
         air: &ScanAir,
         pulses: Range<usize>,
         observer: &dyn Observer,
-    ) -> Result<(Array2<T>, Clipped), Error> {
+    ) -> Result<(Array2<T>, u64), Error> {
         let schedule = &self.plan.geometry.schedule;
         let index = |key: PulseKey| realisation * self.pulses() + pulses.start + key.pulse;
         let lines = self.lines_of_pulses(air, &pulses)?;

@@ -6,7 +6,7 @@ use super::Scene;
 use crate::keys::{ABOVE_ZERO_OR_INF, Checker, Number, ZERO_OR_MORE, keys};
 use wakescope_optics::RadiusDefinition;
 use wakescope_optics::plan::Receiver as ReceiverPath;
-use wakescope_signal::{GaussianPulse, NoiseModel, Pulse as TransmittedPulse, PulseDuration};
+use wakescope_signal::{GaussianPulse, NoiseModel, Pulse as TransmittedPulse};
 
 keys! {
     /// The laser source.
@@ -194,7 +194,7 @@ impl Pulse {
     pub(crate) fn simulated(&self) -> Result<TransmittedPulse, wakescope_signal::Error> {
         match &self.shape {
             PulseShape::Gaussian(shape) => {
-                Ok(GaussianPulse::new(shape.duration(), self.energy_j)?.into())
+                Ok(GaussianPulse::new(shape.sigma_s(), self.energy_j)?.into())
             }
             PulseShape::Sampled(shape) => shape.simulated(self.energy_j),
         }
@@ -238,11 +238,11 @@ impl SampledShape {
 }
 
 impl GaussianShape {
-    /// Its duration as signals have it.
-    pub(crate) fn duration(&self) -> PulseDuration {
+    /// The 1/e half width sigma of |f|^2 in (7), s.
+    pub(crate) fn sigma_s(&self) -> f64 {
         match self.definition {
-            PulseDefinition::Fwhm => PulseDuration::FullWidthHalfMaximum(self.duration_s),
-            PulseDefinition::OneOverEHalfWidth => PulseDuration::OneOverEHalfWidth(self.duration_s),
+            PulseDefinition::Fwhm => GaussianPulse::sigma_of_full_width_s(self.duration_s),
+            PulseDefinition::OneOverEHalfWidth => self.duration_s,
         }
     }
 }

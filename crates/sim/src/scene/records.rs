@@ -30,7 +30,7 @@ impl Scene {
                 .pulse
                 .simulated()
                 .map_or(f64::NAN, |pulse| pulse.sigma_s()),
-            PulseShape::Gaussian(shape) => shape.duration().sigma_s(),
+            PulseShape::Gaussian(shape) => shape.sigma_s(),
         }
     }
 

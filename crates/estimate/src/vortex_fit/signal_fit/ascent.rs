@@ -10,7 +10,7 @@ use ndarray::Array2;
 use crate::error::Error;
 use crate::linalg::dot;
 use crate::vortex_fit::levenberg_marquardt::{
-    Curvature, Normal, StoppingRule, converged, levenberg_marquardt,
+    Normal, StoppingRule, converged, levenberg_marquardt,
 };
 use crate::vortex_fit::signal_fit::likelihood::groups;
 use crate::vortex_fit::wake::free_parameters::{gathered, stepped};
@@ -115,7 +115,7 @@ impl Ascent<'_> {
         let stop = StoppingRule {
             iterations: self.options.max_iterations,
             sigmas: self.options.tolerance_sigmas,
-            curvature: Curvature::Secant,
+            is_secant: true,
         };
         let end = levenberg_marquardt(
             origin,

@@ -12,7 +12,8 @@
 /// the circle.
 const ITERATIONS: usize = 60;
 
-/// The edges along x, seen in a cross-plane: their positions and the lengths about them.
+/// The edges along x, seen in a cross-plane: their positions and the lengths about them. The axial
+/// vorticity there is `[z][y]` \[1/s\].
 #[derive(Debug, Clone)]
 pub(super) struct EdgeGrid {
     /// Positions of the faces along y and z \[m\].
@@ -23,14 +24,6 @@ pub(super) struct EdgeGrid {
     pub(super) z_length_m: Vec<f64>,
     /// Width of the box if it is periodic \[m\].
     pub(super) period_m: Option<f64>,
-}
-
-/// Axial vorticity at the edges of a cross-plane.
-#[derive(Debug, Clone)]
-pub(super) struct EdgePlane<'a> {
-    pub(super) grid: &'a EdgeGrid,
-    /// Vorticity \[1/s\], `[z][y]`.
-    pub(super) vorticity_per_s: Vec<f64>,
 }
 
 /// A vortex found in a plane.
@@ -50,14 +43,18 @@ impl EdgeGrid {
             None => to_m - from_m,
         }
     }
-}
 
-impl EdgePlane<'_> {
     /// The vortex of the given sign about `guess_m`; none where there is no such vorticity.
-    pub(super) fn core(&self, guess_m: [f64; 2], sign: f64, radius_m: f64) -> Option<Core> {
-        let mut core = self.moments(guess_m, sign, radius_m)?;
+    pub(super) fn core(
+        &self,
+        vorticity_per_s: &[f64],
+        guess_m: [f64; 2],
+        sign: f64,
+        radius_m: f64,
+    ) -> Option<Core> {
+        let mut core = self.moments(vorticity_per_s, guess_m, sign, radius_m)?;
         for _ in 0..ITERATIONS {
-            let next = self.moments(core.centre_m, sign, radius_m)?;
+            let next = self.moments(vorticity_per_s, core.centre_m, sign, radius_m)?;
             let moved_m =
                 (next.centre_m[0] - core.centre_m[0]).hypot(next.centre_m[1] - core.centre_m[1]);
             core = next;
@@ -69,24 +66,29 @@ impl EdgePlane<'_> {
     }
 
     /// Centroid and circulation within the circle about `centre_m`.
-    fn moments(&self, centre_m: [f64; 2], sign: f64, radius_m: f64) -> Option<Core> {
-        let grid = self.grid;
-        let ny = grid.y_m.len();
+    fn moments(
+        &self,
+        vorticity_per_s: &[f64],
+        centre_m: [f64; 2],
+        sign: f64,
+        radius_m: f64,
+    ) -> Option<Core> {
+        let ny = self.y_m.len();
         let mut sum = 0.0;
         let mut y_sum = 0.0;
         let mut z_sum = 0.0;
-        for (k, (z_m, z_length_m)) in grid.z_m.iter().zip(&grid.z_length_m).enumerate() {
+        for (k, (z_m, z_length_m)) in self.z_m.iter().zip(&self.z_length_m).enumerate() {
             let dz_m = z_m - centre_m[1];
             if dz_m.abs() > radius_m + z_length_m {
                 continue;
             }
-            let row = &self.vorticity_per_s[k * ny..(k + 1) * ny];
-            for (j, (value, y_length_m)) in row.iter().zip(&grid.y_length_m).enumerate() {
+            let row = &vorticity_per_s[k * ny..(k + 1) * ny];
+            for (j, (value, y_length_m)) in row.iter().zip(&self.y_length_m).enumerate() {
                 let value = sign * value;
                 if value <= 0.0 {
                     continue;
                 }
-                let dy_m = grid.lateral_m(centre_m[0], grid.y_m[j]);
+                let dy_m = self.lateral_m(centre_m[0], self.y_m[j]);
                 if dy_m.abs() > radius_m + y_length_m {
                     continue;
                 }
@@ -108,11 +110,12 @@ impl EdgePlane<'_> {
     /// The place of the strongest vorticity of the given sign where `is_in(y, z)` \[m\].
     pub(super) fn strongest_m(
         &self,
+        vorticity_per_s: &[f64],
         sign: f64,
         is_in: impl Fn(f64, f64) -> bool,
     ) -> Option<[f64; 2]> {
         let mut best = (0.0, None);
-        for (at_m, value, _) in self.edges() {
+        for (at_m, value, _) in self.edges(vorticity_per_s) {
             if sign * value > best.0 && is_in(at_m[0], at_m[1]) {
                 best = (sign * value, Some(at_m));
             }
@@ -121,23 +124,27 @@ impl EdgePlane<'_> {
     }
 
     /// Vorticity of the given sign where `is_in(y, z)`, summed \[m^2/s\].
-    pub(super) fn circulation_m2_s(&self, sign: f64, is_in: impl Fn(f64, f64) -> bool) -> f64 {
+    pub(super) fn circulation_m2_s(
+        &self,
+        vorticity_per_s: &[f64],
+        sign: f64,
+        is_in: impl Fn(f64, f64) -> bool,
+    ) -> f64 {
         let inside = self
-            .edges()
+            .edges(vorticity_per_s)
             .filter(|(at_m, value, _)| sign * value > 0.0 && is_in(at_m[0], at_m[1]));
         inside.map(|(_, value, area_m2)| value * area_m2).sum()
     }
 
     /// Position, vorticity and area of all edges.
-    fn edges(&self) -> impl Iterator<Item = ([f64; 2], f64, f64)> + '_ {
-        let grid = self.grid;
-        let ny = grid.y_m.len();
-        let places = self.vorticity_per_s.iter().enumerate();
+    fn edges(&self, vorticity_per_s: &[f64]) -> impl Iterator<Item = ([f64; 2], f64, f64)> {
+        let ny = self.y_m.len();
+        let places = vorticity_per_s.iter().enumerate();
         places.map(move |(place, value)| {
             let j = place % ny;
             let k = place / ny;
-            let area_m2 = grid.y_length_m[j] * grid.z_length_m[k];
-            ([grid.y_m[j], grid.z_m[k]], *value, area_m2)
+            let area_m2 = self.y_length_m[j] * self.z_length_m[k];
+            ([self.y_m[j], self.z_m[k]], *value, area_m2)
         })
     }
 }
@@ -182,20 +189,15 @@ mod tests {
             .collect()
     }
 
-    fn edges(grid: &EdgeGrid, vorticity_per_s: Vec<f64>) -> EdgePlane<'_> {
-        EdgePlane {
-            grid,
-            vorticity_per_s,
-        }
-    }
-
     #[test]
     fn vortices_off_the_nodes_are_found_within_a_hundredth_of_a_cell_and_across_the_period() {
         let axes = axes();
         let within = 1.0 - (-RADIUS_M * RADIUS_M / 0.01_f64).exp();
         for (y, z) in [(0.011, 0.9), (-0.777, 0.61), (1.497, 1.203)] {
-            let plane = edges(&axes, plane(&axes, &[(1.0, y, z), (-0.8, y - 0.5, z)]));
-            let core = plane.core([y + 0.06, z - 0.05], 1.0, RADIUS_M).unwrap();
+            let plane = plane(&axes, &[(1.0, y, z), (-0.8, y - 0.5, z)]);
+            let core = axes
+                .core(&plane, [y + 0.06, z - 0.05], 1.0, RADIUS_M)
+                .unwrap();
             let off_m = (core.centre_m[0] - y).hypot(core.centre_m[1] - z);
             assert!(off_m < 3e-4, "{off_m} from ({y}, {z})");
             assert!(
@@ -203,7 +205,7 @@ mod tests {
                 "{}",
                 core.circulation_m2_s
             );
-            let other = plane.core([y - 0.45, z], -1.0, RADIUS_M).unwrap();
+            let other = axes.core(&plane, [y - 0.45, z], -1.0, RADIUS_M).unwrap();
             assert!(
                 (axes.lateral_m(y - 0.5, other.centre_m[0])).abs() < 3e-4,
                 "{:?}",
@@ -219,29 +221,22 @@ mod tests {
     #[test]
     fn sums_and_strongest_places_keep_to_their_side_and_sign() {
         let axes = axes();
-        let plane = edges(
+        let plane = plane(
             &axes,
-            plane(
-                &axes,
-                &[(1.0, -0.6, 0.8), (-0.5, 0.3, 0.7), (2.0, 0.9, 1.1)],
-            ),
+            &[(1.0, -0.6, 0.8), (-0.5, 0.3, 0.7), (2.0, 0.9, 1.1)],
         );
         let right = |y: f64, z: f64| y > 0.0 && z > 0.15;
-        assert!((plane.circulation_m2_s(-1.0, right) + 0.5).abs() < 1e-3);
-        assert!((plane.circulation_m2_s(1.0, |y, _| y < 0.2) - 1.0).abs() < 1e-3);
-        let strongest = plane.strongest_m(-1.0, right).unwrap();
+        assert!((axes.circulation_m2_s(&plane, -1.0, right) + 0.5).abs() < 1e-3);
+        assert!((axes.circulation_m2_s(&plane, 1.0, |y, _| y < 0.2) - 1.0).abs() < 1e-3);
+        let strongest = axes.strongest_m(&plane, -1.0, right).unwrap();
         assert!(
             (strongest[0] - 0.3).abs() < 0.02 && (strongest[1] - 0.7).abs() < 0.03,
             "{strongest:?}"
         );
         assert!(
-            plane.strongest_m(-1.0, |y, _| y < -1.4).is_none()
-                || plane.strongest_m(1.0, right).is_some()
+            axes.strongest_m(&plane, -1.0, |y, _| y < -1.4).is_none()
+                || axes.strongest_m(&plane, 1.0, right).is_some()
         );
-        assert!(
-            edges(&axes, vec![0.0; 6100])
-                .core([0.0, 1.0], 1.0, 0.2)
-                .is_none()
-        );
+        assert!(axes.core(&[0.0; 6100], [0.0, 1.0], 1.0, 0.2).is_none());
     }
 }

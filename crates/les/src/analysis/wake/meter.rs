@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::cores::{Core, EdgeGrid, EdgePlane};
+use super::cores::{Core, EdgeGrid};
 use super::record::{SecondaryRecord, VortexRecord, WakeRecord, WakeScales};
 use super::spectrum::mode_energies_m4_s2;
 use super::vorticity::Curl;
@@ -159,14 +159,14 @@ impl WakeMeter {
         let cells: usize = self.curl.cell_m.iter().map(Vec::len).product();
         crate::error::check_lengths(cells, flow.mesh().cells().iter().product())?;
         let faces = flow.faces()?;
-        let plane = self.mean_vorticity(&faces)?;
+        let vorticity_per_s = self.mean_vorticity_per_s(&faces)?;
         let wind = flow.plane_snapshot(&flow.mean_plane_of(&faces)?)?;
         let time_s = flow.time_s();
         let radius_m = self.core_radius * self.scales.spacing_m;
         let mut cores = [None; 2];
         for (v, core) in cores.iter_mut().enumerate() {
             let guess_m = guess(&self.track[v], time_s);
-            *core = faces.core(|| plane.core(guess_m, SIGN[v], radius_m))?;
+            *core = faces.core(|| self.grid.core(&vorticity_per_s, guess_m, SIGN[v], radius_m))?;
         }
         let mut tracks = self.track;
         for (track, core) in tracks.iter_mut().zip(&cores) {
@@ -175,7 +175,8 @@ impl WakeMeter {
         let centres_m = tracks.map(|track| [track[1][1], track[1][2]]);
         let (shear_per_s, wall_shear_per_s) = self.wall_shear(&faces)?;
         let [left, right] = [0, 1].map(|own| Side {
-            plane: &plane,
+            grid: &self.grid,
+            vorticity_per_s: &vorticity_per_s,
             centres_m,
             own,
             is_found: cores[own].is_some(),
@@ -206,8 +207,8 @@ impl WakeMeter {
         }
     }
 
-    /// Axial vorticity averaged over x.
-    fn mean_vorticity(&self, faces: &Faces) -> Result<EdgePlane<'_>, Error> {
+    /// Axial vorticity averaged over x \[1/s\], `[z][y]`.
+    fn mean_vorticity_per_s(&self, faces: &Faces) -> Result<Vec<f64>, Error> {
         let ny = self.grid.y_m.len();
         let x_m = &self.curl.cell_m[0];
         let length_m: f64 = x_m.iter().sum();
@@ -220,11 +221,7 @@ impl WakeMeter {
                 *out = row.iter().zip(x_m).map(|(w, x_m)| w * x_m).sum::<f64>() / length_m;
             }
         });
-        let vorticity_per_s = faces.slabs.all_gather(mean)?;
-        Ok(EdgePlane {
-            grid: &self.grid,
-            vorticity_per_s,
-        })
+        faces.slabs.all_gather(mean)
     }
 
     /// The core in each cross-plane about the one of the mean; NaN where there is none. Each rank
@@ -278,11 +275,7 @@ impl WakeMeter {
                 for (place, row) in places.iter().zip(values.chunks(nx)) {
                     vorticity_per_s[*place] = row[i];
                 }
-                let plane = EdgePlane {
-                    grid,
-                    vorticity_per_s,
-                };
-                let core = plane.core(mean.centre_m, sign, radius_m);
+                let core = grid.core(&vorticity_per_s, mean.centre_m, sign, radius_m);
                 core.map_or([f64::NAN; 2], |core| core.centre_m)
             })
             .collect();
@@ -313,7 +306,11 @@ impl WakeMeter {
             gamma_m2_s.push(circulation_m2_s(wind, centre_m, radius_m, 0.0, POINTS)?);
         }
         let radius_m = self.core_radius * spacing_m;
-        let slices_m = match faces.core(|| side.plane.core(centre_m, sign, radius_m))? {
+        let found = faces.core(|| {
+            self.grid
+                .core(side.vorticity_per_s, centre_m, sign, radius_m)
+        })?;
+        let slices_m = match found {
             Some(core) if side.is_found => self.slices(faces, core, sign, f64::NEG_INFINITY)?,
             _ => vec![[f64::NAN; 2]; self.curl.cell_m[0].len()],
         };
@@ -327,9 +324,11 @@ impl WakeMeter {
             z_spread_m,
             gamma_5_15_m2_s: mean + missing,
             gamma_m2_s,
-            gamma_opposite_m2_s: side
-                .plane
-                .circulation_m2_s(-sign, |y_m, z_m| side.has_above(y_m, z_m)),
+            gamma_opposite_m2_s: self.grid.circulation_m2_s(
+                side.vorticity_per_s,
+                -sign,
+                |y_m, z_m| side.has_above(y_m, z_m),
+            ),
             secondary: self.secondary(faces, side)?,
             outward_shear_per_s: self.outward_shear_per_s(side, shear_per_s),
         })
@@ -373,18 +372,21 @@ impl WakeMeter {
         let sign = -SIGN[side.own];
         let radius_m = self.core_radius * self.scales.spacing_m;
         // The layer at the ground has vorticity of the same sign and would draw the centroid down.
-        let mut upper = side.plane.clone();
-        let rows_below = self.grid.z_m.partition_point(|z_m| *z_m <= side.floor_m);
-        upper.vorticity_per_s[..rows_below * self.grid.y_m.len()].fill(0.0);
-        let plane = side.plane;
-        let first_guess_m = plane.strongest_m(sign, |y_m, z_m| side.has_above(y_m, z_m))?;
-        let first = side.core_in(&upper, first_guess_m, radius_m)?;
-        let second_guess_m = plane.strongest_m(sign, |y_m, z_m| {
-            let dy_m = self.grid.lateral_m(first.centre_m[0], y_m);
+        let grid = &self.grid;
+        let mut upper_per_s = side.vorticity_per_s.to_vec();
+        let rows_below = grid.z_m.partition_point(|z_m| *z_m <= side.floor_m);
+        upper_per_s[..rows_below * grid.y_m.len()].fill(0.0);
+        let first_guess_m = grid.strongest_m(side.vorticity_per_s, sign, |y_m, z_m| {
+            side.has_above(y_m, z_m)
+        })?;
+        let first = side.core_in(&upper_per_s, first_guess_m, radius_m)?;
+        let second_guess_m = grid.strongest_m(side.vorticity_per_s, sign, |y_m, z_m| {
+            let dy_m = grid.lateral_m(first.centre_m[0], y_m);
             let dz_m = z_m - first.centre_m[1];
             side.has_above(y_m, z_m) && dy_m.hypot(dz_m) > 2.0 * radius_m
         });
-        let second = second_guess_m.and_then(|guess_m| side.core_in(&upper, guess_m, radius_m));
+        let second =
+            second_guess_m.and_then(|guess_m| side.core_in(&upper_per_s, guess_m, radius_m));
         match second {
             Some(second) if second.circulation_m2_s.abs() >= first.circulation_m2_s.abs() => {
                 Some(second)
@@ -443,7 +445,9 @@ const SIGN: [f64; 2] = [-1.0, 1.0];
 
 /// The half of the cross-plane that is nearer to one of the two vortices.
 struct Side<'a> {
-    plane: &'a EdgePlane<'a>,
+    grid: &'a EdgeGrid,
+    /// Axial vorticity averaged over x \[1/s\].
+    vorticity_per_s: &'a [f64],
     centres_m: [[f64; 2]; 2],
     own: usize,
     /// Whether its vortex is there.
@@ -454,10 +458,9 @@ struct Side<'a> {
 
 impl Side<'_> {
     fn has(&self, y_m: f64) -> bool {
-        let grid = self.plane.grid;
         let distances_m = self
             .centres_m
-            .map(|[centre_y_m, _]| grid.lateral_m(centre_y_m, y_m).abs());
+            .map(|[centre_y_m, _]| self.grid.lateral_m(centre_y_m, y_m).abs());
         distances_m[self.own] <= distances_m[1 - self.own]
     }
 
@@ -467,8 +470,10 @@ impl Side<'_> {
 
     /// The secondary vortex about a guess. The first vortex of the other side has the same sign: a
     /// search that slides over to it has found nothing.
-    fn core_in(&self, upper: &EdgePlane<'_>, guess_m: [f64; 2], radius_m: f64) -> Option<Core> {
-        let core = upper.core(guess_m, -SIGN[self.own], radius_m)?;
+    fn core_in(&self, upper_per_s: &[f64], guess_m: [f64; 2], radius_m: f64) -> Option<Core> {
+        let core = self
+            .grid
+            .core(upper_per_s, guess_m, -SIGN[self.own], radius_m)?;
         self.has(core.centre_m[0]).then_some(core)
     }
 }

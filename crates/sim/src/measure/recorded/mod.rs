@@ -36,7 +36,6 @@ use num_complex::Complex;
 use std::ops::Range;
 use std::path::Path;
 use wakescope_estimate::window::{Sample, SampleSizes};
-use wakescope_signal::digitise::Clipped;
 
 /// The power of the noise that velocities are held against.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -332,7 +331,7 @@ fn of_run<S: Sample>(
             map::add_records(sums, piece.start - scan.start, samples.view())?;
         }
         observer.advance(lines);
-        Ok(Clipped::default())
+        Ok(0)
     };
     let maps = map::of_sums(&[plan], &scanner, observer, read, |_| ())?;
     Ok(maps.into_iter().map(Box::new).next().unwrap_or_default())
