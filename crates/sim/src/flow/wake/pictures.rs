@@ -332,7 +332,7 @@ mod tests {
             2
         );
         assert!(
-            read_scalar(place, "nothing")
+            read_scalar(&path, place, "nothing")
                 .unwrap_err()
                 .to_string()
                 .contains("nothing")
