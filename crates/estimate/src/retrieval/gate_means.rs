@@ -29,6 +29,14 @@ const OTHER_WINDS: usize = 3;
 /// A statistic below this part of the threshold in medians, which tell two thirds of what all velocities do, is no wake.
 const NOTHING: f64 = 0.5;
 
+/// What may be wrong with a pair that moves in the fit and not in the scan.
+const DOUBTS: [Flag; 4] = [
+    Flag::CoreKept,
+    Flag::Ambiguous,
+    Flag::PoorFit,
+    Flag::NotConverged,
+];
+
 /// Finds the vortices of a scan whose velocities are means over gates.
 ///
 /// # Errors
@@ -37,11 +45,11 @@ pub(super) fn fit_means(map: &ScanMap, options: &RetrievalOptions) -> Result<Sca
     options.validate()?;
     map.validate()?;
     let found = fit_in_winds(map, options)?;
-    let is_pair = found.vortices.len() == 2;
-    if is_pair || options.movement != Movement::Auto || map.lasts_s() == 0.0 {
+    let is_clear = found.vortices.len() == 2 && !DOUBTS.iter().any(|flag| found.has(*flag));
+    if is_clear || options.movement != Movement::Auto || map.lasts_s() == 0.0 {
         return Ok(found);
     }
-    // With times that are not those of the air a search for vortices that move passes by those that stand still.
+    // With times that are not those of the air a search for vortices that move passes by those that stand still, or ends beside them.
     let at_rest = RetrievalOptions {
         movement: Movement::Frozen,
         ..options.clone()

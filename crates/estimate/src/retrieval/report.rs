@@ -17,6 +17,9 @@ use crate::vortex_fit::{Parameter, Top, Wake};
 pub(crate) const OUTLIER: f64 = 4.0;
 /// So many times the root of the threshold is far beyond doubt in correlated noise too.
 const BY_FAR: f64 = 2.0;
+/// Most that one velocity may say for a vortex, in parts of the threshold: a loss of outliers lets one bad velocity exceed it alone, which a narrow
+/// pair or a small core then explains.
+const OF_ONE: f64 = 0.2;
 /// A side of a vortex is seen if the sector reaches so far beyond its centre \[m\], where circulation begins to be counted.
 const SEEN_M: f64 = 5.0;
 /// Chi-square per degree after robust scaling that is too much, and part of outliers that is.
@@ -93,9 +96,31 @@ impl<'a> Report<'a> {
         })
     }
 
-    /// Drop of chi-square from one fit to another one with more vortices, with correlated velocities counted once; infinite without the first.
+    /// Drop of chi-square from one fit to another one with more vortices, with correlated velocities counted once; infinite without the first. A
+    /// drop that no velocity alone may decide is counted with at most [`OF_ONE`] of the threshold from each.
     fn gain(&self, without: Option<&End>, with: &End, alike: f64) -> f64 {
-        without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2) / alike
+        let Some(without) = without else {
+            return f64::INFINITY;
+        };
+        let variance = self.scale.powi(2);
+        let threshold = self.stage.options.threshold;
+        let of_all = (without.chi2 - with.chi2) / variance / alike;
+        if of_all < threshold {
+            return of_all;
+        }
+        let squares = &self.stage.squares;
+        let before = squares.rows(&without.wake.to_array(), &[]).residuals;
+        let after = squares.rows(&with.wake.to_array(), &[]).residuals;
+        let mut of_several = 0.0;
+        for (before, after) in before.iter().zip(&after) {
+            let drop = 2.0 * (squares.loss.at(*before).0 - squares.loss.at(*after).0);
+            of_several += (drop / variance).min(OF_ONE * threshold) / alike;
+        }
+        if of_several < threshold {
+            of_several
+        } else {
+            of_all
+        }
     }
 
     /// Whether the circulations of all vortices of an end are positive beyond doubt.

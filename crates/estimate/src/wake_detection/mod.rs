@@ -4,7 +4,6 @@
 //! |---|---|
 //! | `detector` | [`WakeDetector`]: the statistic of a scan with given geometry, noise and background; `bank`: the wakes that are tried |
 //! | `law` | [`EmptyScanLaw`]: thresholds for a rate of false alarms, and the rate of a statistic |
-//! | `spikes` | velocities that stand off their neighbours, to be left out before |
 //! | `power` | [`DetectionTrials`]: share of wakes that are found, the smallest circulation that is |
 //!
 //! The rate of false alarms holds for the background that the test assumes, and for no other: the threshold for white noise raises
@@ -14,10 +13,8 @@ mod bank;
 mod detector;
 mod law;
 mod power;
-mod spikes;
 
 pub use bank::DetectorOptions;
 pub use detector::{WakeDetector, WakeStatistic};
 pub use law::EmptyScanLaw;
 pub use power::DetectionTrials;
-pub use spikes::without_spikes;

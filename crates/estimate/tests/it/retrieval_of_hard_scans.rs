@@ -3,7 +3,7 @@
 use super::retrieval_cases::*;
 use crate::fixtures::normal;
 use ndarray::Array2;
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_estimate::Measured;
 use wakescope_estimate::retrieval::*;
@@ -401,4 +401,102 @@ fn the_profile_of_the_cores_is_part_of_the_deviations_unless_it_is_stated() {
     }
     let (open, stated) = (root_mean_square(&open), root_mean_square(&stated));
     assert!(open > 0.4 && open < 1.5 && stated > 1.8, "{open} {stated}");
+}
+
+/// A scan of coarse gates with noise of 0.5 m/s, in which so many of the velocities are bad.
+fn with_bad_velocities(wake: &Wake, bad: f64, seed: u64) -> (ScanMap, RetrievalOptions) {
+    let options = RetrievalOptions {
+        gate: Gate::Gaussian { std_m: 3.46 },
+        core_prior: Some(CorePrior::TYPICAL),
+        movement: Movement::Auto,
+        ..Default::default()
+    };
+    let lines = (2f64.to_radians(), 0.4f64.to_radians(), 31);
+    let mut map = noisy(wake, &options, lines, (310.0, 12.0, 19), seed);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(900 + seed);
+    for velocity in &mut map.velocity_m_s {
+        if rng.random::<f64>() < bad {
+            *velocity = 40.0 * rng.random::<f64>() - 20.0;
+        }
+    }
+    map.sigma_m_s = None;
+    (map, options)
+}
+
+/// A narrow pair, or one with a small core, explains any bad velocity: a wake is seen by more than one.
+#[test]
+fn bad_velocities_in_empty_air_are_no_wakes() {
+    let calm = Wake::from_array(&[0.0, 0.0, 400.0, 45.0, 440.0, 45.0, 3.0, 3.0, 2.0, 0.0]);
+    for bad in [0.01, 0.05, 0.3] {
+        for seed in 0..8 {
+            let (map, options) = with_bad_velocities(&calm, bad, seed);
+            let found = fit_scan(&map, Velocities::Means, &options).unwrap();
+            assert!(
+                found.has(Flag::NoWake),
+                "{bad} {seed}: {:?} {:?}",
+                found.vortices,
+                found.flags
+            );
+        }
+    }
+}
+
+/// A search in velocities of which many are bad would be led by these.
+#[test]
+fn wakes_are_found_among_many_bad_velocities() {
+    let wake = Wake::from_array(&[400.0, 400.0, 400.0, 45.0, 440.0, 45.0, 3.0, 3.0, 2.0, 0.0]);
+    let mut far = Vec::new();
+    for seed in 0..12 {
+        let (map, options) = with_bad_velocities(&wake, 0.3, seed);
+        let found = fit_scan(&map, Velocities::Means, &options).unwrap();
+        let pulls = found.vortices.iter().map(|vortex| {
+            let Measured { value, std } = vortex.circulation_m2_s;
+            (value - 400.0).abs() / std
+        });
+        let is_good = found.vortices.len() == 2 && pulls.fold(0.0, f64::max) < 3.5;
+        if !is_good {
+            far.push((seed, found.vortices.clone(), found.flags.clone()));
+        }
+    }
+    assert!(far.len() <= 1, "{far:#?}");
+}
+
+/// A scan whose lines have times of half a minute and more, though the vortices stand where they are in all of it.
+#[test]
+fn vortices_that_stand_in_scans_of_a_minute_are_taken_for_such() {
+    for (seed, lasts_s, wind_m_s) in [
+        (1, 30.0, 5.0),
+        (1, 60.0, 2.0),
+        (3, 60.0, 2.0),
+        (0, 120.0, 2.0),
+    ] {
+        let wake = Wake::from_array(&[
+            400.0, 400.0, 400.0, 45.0, 440.0, 45.0, 3.0, 3.0, wind_m_s, 0.0,
+        ]);
+        let options = RetrievalOptions {
+            gate: Gate::Point,
+            movement: Movement::Auto,
+            core_prior: Some(CorePrior::TYPICAL),
+            ..Default::default()
+        };
+        let lines = (2f64.to_radians(), 0.2f64.to_radians(), 61);
+        let mut map = noisy(&wake, &options, lines, (300.0, 5.0, 49), seed);
+        map.sigma_m_s = None;
+        for (line, time_s) in map.time_s.iter_mut().enumerate() {
+            *time_s = lasts_s * line as f64 / 60.0;
+        }
+        let found = fit_scan(&map, Velocities::Means, &options).unwrap();
+        assert!(
+            found.has(Flag::MotionIgnored),
+            "{lasts_s}: {:?}",
+            found.flags
+        );
+        for vortex in &found.vortices {
+            let Measured { value, std } = vortex.circulation_m2_s;
+            assert!(
+                (value - 400.0).abs() < 4.0 * std && std < 10.0,
+                "{lasts_s} {seed}: {vortex:?}"
+            );
+        }
+    }
 }

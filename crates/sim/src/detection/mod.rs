@@ -26,10 +26,10 @@ use crate::progress::{Observer, Stage};
 use crate::streams::stream;
 use ndarray::Array2;
 use wakescope_estimate::Measured;
-use wakescope_estimate::retrieval::{Gate, ScanMap, ScanTurbulence, Turbulence};
+use wakescope_estimate::retrieval::{Gate, ScanMap, ScanTurbulence, Turbulence, without_spikes};
 use wakescope_estimate::vortex_fit::WakeModel;
 use wakescope_estimate::wake_detection::{
-    DetectorOptions, EmptyScanLaw, WakeDetector, WakeStatistic, without_spikes,
+    DetectorOptions, EmptyScanLaw, WakeDetector, WakeStatistic,
 };
 
 /// Backgrounds with wakes that are drawn for the shares of wakes that are found.
