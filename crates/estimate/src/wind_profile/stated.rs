@@ -23,6 +23,9 @@ use crate::parallel::map_each;
 const REACH: f64 = 6.0;
 /// Least variance of the noise in parts of that of the turbulence: without any a covariance is singular.
 const LEAST_NOISE: f64 = 1e-4;
+/// How often, and by which factor, the noise is raised.
+const RAISES: usize = 8;
+const RAISE: f64 = 3.0;
 /// Steps in which displacements of blocks are compared \[m\].
 const SAME_DISPLACEMENT_M: f64 = 1e-3;
 
@@ -183,11 +186,9 @@ impl Sensitivity {
                 turbulence[[j, i]] = turbulence[[i, j]];
             }
         }
-        let mut total = fit.eps23 * &turbulence;
-        let noise_m2_s2 = fit.noise_m2_s2.max(LEAST_NOISE * total[[0, 0]]);
-        total.diag_mut().mapv_inplace(|value| value + noise_m2_s2);
         let what = "the covariance of the velocities";
-        let lower = cholesky(total).ok_or_else(|| singular(what, order))?;
+        let total = fit.eps23 * &turbulence;
+        let lower = factor(&total, fit.noise_m2_s2).ok_or_else(|| singular(what, order))?;
         // With L^-1 and an orthonormal basis N of L^-1 X: P = L^-T (1 - N N^T) L^-1
         let mut columns = Array2::zeros((order, 0));
         for column in block.mean_columns() {
@@ -233,6 +234,21 @@ impl Sensitivity {
     }
 }
 
+/// Cholesky factor of a covariance with that variance of noise added. Beams that count as parallel make the covariance of gates near the lidar
+/// indefinite by a tenth of it: where the noise is smaller, it is raised until there is a factor, which makes the stated deviations larger.
+fn factor(turbulence: &Array2<f64>, noise_m2_s2: f64) -> Option<Array2<f64>> {
+    let mut noise_m2_s2 = noise_m2_s2.max(LEAST_NOISE * turbulence[[0, 0]]);
+    for _ in 0..RAISES {
+        let mut total = turbulence.clone();
+        total.diag_mut().mapv_inplace(|value| value + noise_m2_s2);
+        if let Some(lower) = cholesky(total) {
+            return Some(lower);
+        }
+        noise_m2_s2 *= RAISE;
+    }
+    None
+}
+
 /// Trace of a product.
 fn trace(a: &Array2<f64>, b: &Array2<f64>) -> f64 {
     let mut sum = 0.0;
@@ -270,4 +286,42 @@ fn orthonormal_basis(columns: &Array2<f64>) -> Array2<f64> {
         }
     }
     basis
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Beams 4 degrees apart in air without noise: some count as parallel and others do not, so that the covariance is not positive definite.
+    #[test]
+    fn low_noise_in_turbulence_has_a_factor() {
+        let mut gates = Vec::new();
+        for beam in 0..90 {
+            let azimuth_rad = f64::from(4 * beam).to_radians();
+            let up = 5f64.to_radians().sin();
+            let across = 5f64.to_radians().cos();
+            let direction = [across * azimuth_rad.sin(), across * azimuth_rad.cos(), up];
+            for gate in 0..4 {
+                let range_m = 15.0 + 30.0 * f64::from(gate);
+                let time_s = 0.5 * f64::from(beam);
+                let carried_m_s = [4.0, -4.5, 0.0];
+                gates.push(GatePosition::new(direction, range_m, time_s, carried_m_s));
+            }
+        }
+        let covariance = GateCovariance::new(9.0, &[60.0], 500.0).unwrap();
+        let mut matrix = covariance.matrices(&gates).remove(0);
+        for i in 0..gates.len() {
+            for j in 0..i {
+                matrix[[j, i]] = matrix[[i, j]];
+            }
+        }
+        let mut least = matrix.clone();
+        let least_m2_s2 = LEAST_NOISE * matrix[[0, 0]];
+        least.diag_mut().mapv_inplace(|value| value + least_m2_s2);
+        assert!(cholesky(least).is_none());
+        let lower = factor(&matrix, 0.0).unwrap();
+        let square = lower.row(0).dot(&lower.row(0));
+        let over = square / matrix[[0, 0]];
+        assert!(over < 1.3, "{over}");
+    }
 }
