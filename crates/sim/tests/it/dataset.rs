@@ -197,6 +197,50 @@ fn cells_are_those_of_a_run_of_the_scene_and_vortices_are_where_lines_pass_them(
     assert!(wakes >= 12, "{wakes}");
 }
 
+/// A plan of eight flights with a pair at rest at a lateral position, m, and further keys of the scan and tables.
+fn still_plan(lateral_position_m: f64, scan: &str, tables: &str) -> String {
+    format!(
+        "title = \"still\"\nsites = 1\nflights_per_site = 8\nflights_per_chunk = 8\nempty = 0.0\nspectra = false\n\
+         [scene.detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n\
+         [scene.flow]\nkind = \"vortex_pair\"\nmotion = \"frozen\"\nlateral_position_m = {lateral_position_m:?}\n\
+         [scene.scan]\nrange_max_m = 560.0\npulses_per_line = 1\n{scan}\n\
+         [scene.estimator]\ngate_step_samples = 10\n{tables}\n\
+         [flight]\n\"flow.height_m\" = {{ uniform = [36.0, 44.0] }}\n"
+    )
+}
+
+#[test]
+fn vortices_are_in_view_wherever_the_lidar_is_and_looks() {
+    let temp = tempfile::tempdir().unwrap();
+    let at = temp.path();
+    let mut times_s = Vec::new();
+    let back = "azimuth_rad = 4.71238898038469\nlidar = { flight_azimuth_rad = 0.0 }";
+    let oblique = "azimuth_rad = 0.7853981633974483\nlidar = { flight_azimuth_rad = 0.0 }";
+    for (lateral_position_m, lidar) in [
+        (400.0, ""),
+        (520.0, "lidar = { y_m = 120.0 }"),
+        (-400.0, back),
+        (300.0, oblique),
+        (400.0, "lidar = { velocity_m_s = [0.0, -20.0, 0.0] }"),
+    ] {
+        let scan = format!("elevation_step_rad = 0.01\n{lidar}");
+        let text = still_plan(lateral_position_m, &scan, "");
+        std::fs::write(at.join("p.toml"), text).unwrap();
+        let out = format!("d{}", times_s.len());
+        ran(at, &["--out", &out, "--flights", "2"]);
+        let store = Store::open(&at.join(out).join("scans.zarr")).unwrap();
+        let in_view = store.values("in_view", 0..2).unwrap();
+        assert!(in_view.iter().all(|value| *value == 1.0), "{lidar}");
+        times_s.push(store.values("passing_time", 0..2).unwrap());
+    }
+    assert_eq!(times_s[0], times_s[1]);
+    for flight in 0..2 {
+        // On the other side the right vortex is the nearer one.
+        assert_eq!(times_s[0][[flight, 0, 0]], times_s[2][[flight, 0, 1]]);
+        assert_eq!(times_s[0][[flight, 0, 1]], times_s[2][[flight, 0, 0]]);
+    }
+}
+
 #[test]
 fn plans_and_folders_that_cannot_be_are_refused_and_nothing_is_written() {
     let temp = folder();
