@@ -212,6 +212,11 @@ impl DatasetPlan {
         value.map_err(|problem| refused(format!("{} is {}", problem.allowed, problem.value)))
     }
 
+    /// A refusal of keys of the scene, with their lines.
+    pub(super) fn refused(&self, problems: Vec<Problem>) -> Error {
+        self.relocated(invalid(&self.path, problems))
+    }
+
     /// An error of a drawn scene with the lines of the plan: its own text is that of no file.
     fn relocated(&self, mut error: Error) -> Error {
         if let Error::Invalid { problems, .. } = &mut error

@@ -242,6 +242,48 @@ fn vortices_are_in_view_wherever_the_lidar_is_and_looks() {
 }
 
 #[test]
+fn vortices_without_truth_are_refused_and_winds_alone_are_not() {
+    let temp = tempfile::tempdir().unwrap();
+    let at = temp.path();
+    let elevations = "elevation_step_rad = 0.01\n";
+    let ppi = "lidar = { flight_azimuth_rad = 0.0 }\npattern = { kind = \"ppi\", elevations_rad = [0.1], azimuth_min_rad = 1.2, azimuth_max_rad = 1.9, azimuth_step_rad = 0.1 }";
+    let stare = "pattern = { kind = \"stare\", elevation_rad = 0.1, lines = 3 }";
+    let along = format!("{elevations}azimuth_rad = 1.0\nlidar = {{ flight_azimuth_rad = 1.0 }}");
+    let pair = "[[scene.added_flows]]\nkind = \"calm\"\n[[scene.added_flows]]\nkind = \"vortex_pair\"\nlateral_position_m = 380.0";
+    for (scan, tables, wanted) in [
+        (
+            ppi,
+            "",
+            "p.toml:18: scan.pattern.kind = \"ppi\" is not allowed: \"rhi\"",
+        ),
+        (stare, "", "scan.pattern.kind = \"stare\" is not allowed"),
+        (
+            along.as_str(),
+            "",
+            "scan.azimuth_rad = 1.0 is not allowed: an azimuth across",
+        ),
+        (
+            elevations,
+            pair,
+            "added_flows[1].kind = \"vortex_pair\" is not allowed: a flow without vortices",
+        ),
+    ] {
+        let text = still_plan(400.0, scan, tables);
+        std::fs::write(at.join("p.toml"), &text).unwrap();
+        let message = refused(at, &["--out", "d"]);
+        assert!(message.contains(wanted), "{message}");
+        // A pair among the added flows is there in empty flights, too.
+        let text = text.replace("empty = 0.0", "empty = 1.0");
+        std::fs::write(at.join("p.toml"), &text).unwrap();
+        match tables {
+            "" => drop(ran(at, &["--check"])),
+            _ => assert!(refused(at, &["--check"]).contains(wanted)),
+        }
+    }
+    assert_eq!(names(at), ["p.toml"]);
+}
+
+#[test]
 fn plans_and_folders_that_cannot_be_are_refused_and_nothing_is_written() {
     let temp = folder();
     let at = temp.path();
