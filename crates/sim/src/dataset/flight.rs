@@ -287,7 +287,7 @@ fn wake_ages_tau(plan: &Plan, shape: &Shape) -> Vec<f64> {
     ages
 }
 
-/// The mean wind at some heights, m/s, without vortices and turbulence.
+/// The mean wind at some heights over the origin when the scan begins, m/s, without vortices and turbulence.
 fn mean_wind_m_s(scene: &SceneFile, heights_m: &[f64]) -> Result<Vec<[f64; 3]>, Error> {
     let pair = scene.content.flow.pair();
     let wind = mean_winds(pair.map_or(0.0, |pair| pair.cross_wind_m_s), scene)?;

@@ -242,6 +242,26 @@ fn vortices_are_in_view_wherever_the_lidar_is_and_looks() {
 }
 
 #[test]
+fn the_true_wind_is_the_sum_of_all_mean_winds() {
+    let temp = tempfile::tempdir().unwrap();
+    let at = temp.path();
+    let winds = "[[scene.added_flows]]\nkind = \"linear\"\nvelocity_m_s = [1.0, 2.0, 0.0]\ngradient_v_per_s = [1e-3, 1e-3, 0.01]\n\
+                 [[scene.added_flows]]\nkind = \"uniform\"\nlateral_m_s = 0.5\nvertical_m_s = 0.1";
+    let text = still_plan(400.0, "elevation_step_rad = 0.05", winds);
+    std::fs::write(at.join("p.toml"), text).unwrap();
+    ran(at, &["--out", "d", "--flights", "1"]);
+    let store = Store::open(&at.join("d/scans.zarr")).unwrap();
+    let along_m_s = store.values("wind_x", 0..1).unwrap();
+    let across_m_s = store.values("wind_y", 0..1).unwrap();
+    for index in 0..20 {
+        let height_m = 10.0 * (index as f64 + 1.0);
+        assert_eq!(along_m_s[[0, index]], 1.0);
+        let off_m_s = across_m_s[[0, index]] - (2.5 + 0.01 * height_m);
+        assert!(off_m_s.abs() < 1e-12, "{height_m} m: {off_m_s}");
+    }
+}
+
+#[test]
 fn vortices_without_truth_are_refused_and_winds_alone_are_not() {
     let temp = tempfile::tempdir().unwrap();
     let at = temp.path();
