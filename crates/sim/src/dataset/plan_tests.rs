@@ -59,6 +59,33 @@ fn a_distribution_that_is_appended_moves_no_other() {
 }
 
 #[test]
+fn expressions_compute_with_keys_of_added_flows() {
+    let tables = "[[scene.added_flows]]\nkind = \"calm\"\n[[scene.added_flows]]\nkind = \"eddies\"\n\
+                  [flight]\n\"added_flows.1.dissipation_m2_s3\" = { uniform = [1e-3, 1e-2] }\n\
+                  \"added_flows.1.outer_scale_m\" = \"50 + 1000*added_flows.1.dissipation_m2_s3\"\n";
+    let drawn = plan(&with("", tables)).unwrap();
+    drawn.check().unwrap();
+    let scene = drawn.flight(1).unwrap().scene;
+    let eddies = scene.content.eddies().unwrap();
+    let expected_m = 50.0 + 1000.0 * eddies.dissipation_m2_s3;
+    assert_eq!(eddies.outer_scale_m, expected_m);
+    for (from, wanted) in [
+        (
+            "added_flows.2",
+            "added_flows.2.dissipation_m2_s3 is not a key",
+        ),
+        (
+            "added_flows.0",
+            "added_flows.0.dissipation_m2_s3 is not a key",
+        ),
+    ] {
+        let other = tables.replace("*added_flows.1", &format!("*{from}"));
+        let refusal = message("", &other);
+        assert!(refusal.contains(wanted), "{refusal}");
+    }
+}
+
+#[test]
 fn another_seed_takes_the_place_of_that_of_the_text() {
     let first = plan(TINY).unwrap();
     let other = DatasetPlan::parse(TINY, Path::new("p.toml"), Some(7)).unwrap();
