@@ -22,4 +22,4 @@ mod tests;
 pub use direction::Direction;
 pub use head::Head;
 pub use path::{Stop, SweepMode};
-pub use schedule::{Beam, Line, Mount, Schedule};
+pub use schedule::{Beam, Crossing, Line, Mount, Schedule};

@@ -66,6 +66,17 @@ impl Beam {
     }
 }
 
+/// Where the vertical plane of a line of sight crosses a line along x, as a lidar sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Elevation, rad.
+    pub elevation_rad: f64,
+    /// Distance, m.
+    pub range_m: f64,
+    /// Position along x, m.
+    pub x_m: f64,
+}
+
 /// A whole scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schedule {
@@ -243,6 +254,29 @@ impl Schedule {
     /// The beam in the middle of a line.
     pub fn middle(&self, line: usize) -> Beam {
         self.beam(line, 0.5 * (self.lines[line].pulses as f64 - 1.0))
+    }
+
+    /// The horizontal direction of the vertical plane of a beam.
+    pub fn ahead(&self, beam: &Beam) -> Direction {
+        let (zero_rad, from_x_rad) = self.mount.reference_rad;
+        Direction::new((beam.azimuth_rad - zero_rad) + from_x_rad, 0.0)
+    }
+
+    /// Where the vertical plane of the middle of a line of sight crosses the line along x at a place (y, z), m. A plane along x
+    /// crosses none: its range is not finite.
+    ///
+    /// # Panics
+    /// If there is no such line of sight.
+    pub fn crossing(&self, line: usize, (y_m, z_m): (f64, f64)) -> Crossing {
+        let beam = self.middle(line);
+        let [along, across, _] = self.ahead(&beam).0;
+        let ahead_m = (y_m - beam.position_m[1]) / across;
+        let above_m = z_m - beam.position_m[2];
+        Crossing {
+            elevation_rad: above_m.atan2(ahead_m),
+            range_m: ahead_m.hypot(above_m),
+            x_m: beam.position_m[0] + ahead_m * along,
+        }
     }
 
     /// First and last beam of each line, by which the whole line is bounded.

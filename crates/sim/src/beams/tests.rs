@@ -131,6 +131,35 @@ fn a_lidar_that_flies_sees_its_own_speed() {
 }
 
 #[test]
+fn the_plane_of_a_line_crosses_a_line_along_x_where_its_beam_would_meet_it() {
+    let mount = Mount {
+        position_m: [30.0, 120.0, 5.0],
+        velocity_m_s: [2.0, -20.0, 0.5],
+        reference_rad: (0.4, 0.0),
+    };
+    let jumping = head(f64::INFINITY, f64::INFINITY);
+    for (azimuth_rad, y_m) in [(1.9, 520.0), (1.1, 300.0), (4.9, -400.0)] {
+        let stop = Stop {
+            time_s: Some(3.0),
+            ..Stop::new(SweepMode::Rhi, [azimuth_rad, 0.1])
+        };
+        let scan = Schedule::new(&[stop], 0.01, 5, &jumping, mount).unwrap();
+        let crossing = scan.crossing(0, (y_m, 47.0));
+        let beam = scan.middle(0);
+        let towards = Direction::new(azimuth_rad - 0.4, crossing.elevation_rad);
+        let place_m = towards.at_range_m(beam.position_m, crossing.range_m);
+        for (found, expected) in place_m.into_iter().zip([crossing.x_m, y_m, 47.0]) {
+            near(found, expected);
+        }
+        // It is ahead of the lidar.
+        assert!(crossing.elevation_rad.cos() > 0.0);
+    }
+    let along = Stop::new(SweepMode::Rhi, [0.4, 0.1]);
+    let scan = Schedule::new(&[along], 0.01, 5, &jumping, mount).unwrap();
+    assert!(!scan.crossing(0, (520.0, 47.0)).range_m.is_finite());
+}
+
+#[test]
 fn the_head_takes_the_time_of_the_table() {
     for row in rows("head_motion") {
         let head = head(row("speed_rad_s"), row("acceleration_rad_s2"));

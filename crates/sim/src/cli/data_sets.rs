@@ -65,7 +65,8 @@ type Found = (usize, usize, PredictedScan);
 /// still air. Returns what it found, flight after flight, and the plan of the data set.
 ///
 /// # Errors
-/// A data set that is damaged or has another plan beside it; a split without ready flights; what the method refuses.
+/// A data set that is damaged or has another plan beside it; a split without ready flights; scans that are not across the flight; what
+/// the method refuses.
 pub(super) fn predict(
     folder: &Path,
     splits: &[Split],
@@ -96,6 +97,7 @@ pub(super) fn predict(
         .map(|flight| {
             let scans = lines.scans_of_flight(&data_set, *flight, format)?;
             let scene = plan.flight(*flight)?.scene.of_one_scan_in_still_air()?;
+            refuse_other_planes(&scene)?;
             let found = method(*flight, &scene, scans)?;
             observer.advance(1);
             Ok(found)
@@ -109,6 +111,19 @@ pub(super) fn predict(
         }
     }
     Ok((scans, origin))
+}
+
+/// Refuses scans whose vortices would be at other places than those that methods report: ranges and elevations from y = 0 towards +y.
+fn refuse_other_planes(scene: &SceneFile) -> Result<(), Error> {
+    if scene.content.scan.is_across() {
+        return Ok(());
+    }
+    let reason = "retrieve and detect need data sets of scan.pattern.kind = \"rhi\" in the plane across the flight, towards +y, with a lidar \
+                  at rest at y_m = 0.0; other methods may read this one";
+    Err(Error::Key {
+        key: "scan.lidar",
+        reason: reason.into(),
+    })
 }
 
 /// What is said of a scan of a flight that a method refuses.

@@ -69,7 +69,8 @@ pub(super) fn score(args: &ScoreArgs, cli: &Cli) -> Result<(), Error> {
         report += &format!("wrote {} files to {}\n", files.len(), folder.display());
     }
     let readings_before = score::add_reading(&args.data_set, &text, &options.splits);
-    if readings_before > 0 {
+    let has_test = options.splits.iter().any(|split| split.is_test());
+    if has_test && readings_before > 0 {
         report += &format!(
             "test splits of this data set were scored with other predictions before: {readings_before}\n"
         );

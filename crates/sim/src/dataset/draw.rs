@@ -12,6 +12,8 @@ use toml::Value;
 
 /// Half a step of the sequence, whose numbers are multiples of 2^-24: no distribution is evaluated at 0.
 const HALF_STEP: f64 = 1.0 / (1 << 25) as f64;
+/// Standard deviations from the mean beyond which the probabilities of a normal law are no normal numbers of f64.
+const FARTHEST: f64 = 37.0;
 /// Dimensions of the sequence.
 pub(super) const DIMENSIONS: usize = sobol_burley::NUM_DIMENSIONS as usize;
 /// Points of one sequence: later ones repeat these.
@@ -94,6 +96,12 @@ impl Distribution {
             ("normal", &[mean, standard_deviation, least, most])
                 if standard_deviation > 0.0 && least < most =>
             {
+                let off = (least - mean).max(mean - most) / standard_deviation;
+                if off > FARTHEST {
+                    return Err(refused(&format!(
+                        "bounds of which one is within {FARTHEST} standard deviations of the mean, e.g. {{ normal = [0.0, 15.0, -45.0, 45.0] }}"
+                    )));
+                }
                 Ok(Self::Normal {
                     mean,
                     standard_deviation,
@@ -206,6 +214,10 @@ pub(super) fn chosen(weights: &[f64], u: f64) -> usize {
 
 /// The value below which a normal variable is that lies between two bounds, with probability u.
 fn cut_normal([mean, standard_deviation]: [f64; 2], [least, most]: [f64; 2], u: f64) -> f64 {
+    if least > mean {
+        // Probabilities of the upper tail round to 1, those of its mirror image do not.
+        return -cut_normal([-mean, standard_deviation], [-most, -least], 1.0 - u);
+    }
     let Ok(normal) = Normal::new(mean, standard_deviation) else {
         return mean;
     };
@@ -285,6 +297,42 @@ mod tests {
     }
 
     #[test]
+    fn values_in_a_tail_are_those_of_the_law_and_mirror_each_other() {
+        let key = crate::sweep::resolve("flow.height_m", "").unwrap();
+        let read = |text: &str| {
+            let table: toml::Table = toml::from_str(&format!("x = {text}")).unwrap();
+            Distribution::read("key", &key, &table["x"]).unwrap()
+        };
+        for (low, high) in [(6.0, 8.0), (9.0, 12.0), (30.0, 40.0), (36.9, 60.0)] {
+            let upper = read(&format!(
+                "{{ normal = [1.0, 1.0, {:?}, {:?}] }}",
+                1.0 + low,
+                1.0 + high
+            ));
+            let lower = read(&format!(
+                "{{ normal = [-1.0, 1.0, {:?}, {:?}] }}",
+                -1.0 - high,
+                -1.0 - low
+            ));
+            let mut before = 0.0;
+            for step in 0..64 {
+                let u = (f64::from(step) + 0.5) / 64.0;
+                let drawn = number(&upper.value(u)).unwrap();
+                assert_eq!(number(&lower.value(1.0 - u)), Some(-drawn));
+                let value = drawn - 1.0;
+                let is_within = (low..=high).contains(&value);
+                assert!(is_within && value > before, "{low} {u}: {value}");
+                // Far out the law is nearly exponential: the probability beyond x is exp(-x^2/2)/x (1 - 1/x^2 ...).
+                let beyond =
+                    |x: f64| (-0.5 * (x * x - low * low)).exp() / x * (1.0 - 1.0 / (x * x));
+                let expected = (beyond(low) - beyond(value)) / (beyond(low) - beyond(high));
+                assert!((expected - u).abs() < 0.01, "{low} {u}: {expected}");
+                before = value;
+            }
+        }
+    }
+
+    #[test]
     fn an_aligned_block_has_one_point_in_each_stratum_of_every_dimension() {
         for dimension in [0, 1, 2, 17, 255] {
             for first in [0, 64, 65_472] {
@@ -311,6 +359,14 @@ mod tests {
                 "standard deviation above 0",
             ),
             ("{ normal = [0.0, 1.0, 1.0, 1.0] }", "least < most"),
+            (
+                "{ normal = [0.0, 1.0, 38.0, 40.0] }",
+                "within 37 standard deviations",
+            ),
+            (
+                "{ normal = [0.0, 1.0, -90.0, -38.0] }",
+                "within 37 standard deviations",
+            ),
             ("{ choice = [] }", "at least one value"),
             ("{ choice = [\"a\"] }", "a number"),
             (

@@ -167,14 +167,47 @@ impl DrawnKeys {
                 continue;
             }
             let key = varying(name, "")?;
-            for (row, cell) in self.rows.iter_mut().zip(cells) {
-                row.push(key.read(cell)?);
+            for (number, (row, cell)) in self.rows.iter_mut().zip(cells).enumerate() {
+                let of_file = |problem| in_row(problem, number + 1, &rows.file);
+                row.push(key.read(cell).map_err(of_file)?);
             }
             let origin = Origin::Row(self.rows[0].len() - 1);
             self.keys.push((key, origin));
         }
         self.rows_text = Some(text);
         Ok(())
+    }
+
+    /// Refuses keys of added flows that the scene does not have.
+    ///
+    /// # Errors
+    /// All such keys, with the numbers that are there.
+    pub(super) fn with_flows_of(self, scene: &Table) -> Result<Self, Vec<Problem>> {
+        let flows = scene.get("added_flows").and_then(Value::as_array);
+        let count = flows.map_or(0, Vec::len);
+        let mut problems = Vec::new();
+        for (key, _) in &self.keys {
+            let Some(rest) = key.path.strip_prefix("added_flows.") else {
+                continue;
+            };
+            let number = rest.split('.').next().unwrap_or_default();
+            if number.parse().is_ok_and(|number: usize| number < count) {
+                continue;
+            }
+            let allowed = match count {
+                0 => "a plan with [[scene.added_flows]]: this one has none".to_owned(),
+                1 => "number 0 of added_flows: [[scene.added_flows]] has one".to_owned(),
+                _ => format!(
+                    "a number of added_flows from 0 to {}: [[scene.added_flows]] has {count}",
+                    count - 1
+                ),
+            };
+            problems.push(Problem::new(&key.name, "", allowed));
+        }
+        match problems.is_empty() {
+            true => Ok(self),
+            false => Err(problems),
+        }
     }
 
     fn refuse_repeated(&self, problems: &mut Vec<Problem>) {
@@ -236,6 +269,14 @@ impl DrawnKeys {
             Origin::Row(column) => self.rows.iter().position(|row| row[*column] == *value),
             Origin::Expression(_) => None,
         }
+    }
+}
+
+/// A problem of a cell with its row, from 1, and its file.
+fn in_row(problem: Problem, row: usize, file: &str) -> Problem {
+    Problem {
+        allowed: format!("{}; it is in row {row} of {file}", problem.allowed),
+        ..problem
     }
 }
 

@@ -243,13 +243,15 @@ fn add_vortices(
     );
 }
 
-/// Whether the centre of a vortex lies within the first and the last gate and line.
+/// Whether the centre of a vortex lies within the first and the last gate and line, seen from where the lidar is when it is passed.
 fn is_in_view(plan: &Plan, shape: &Shape, vortex: &VortexResult) -> bool {
-    let (y_m, z_m) = vortex.place_m();
-    let above_m = z_m - plan.scene().scan.lidar_height_m;
-    let elevation_deg = above_m.atan2(y_m).to_degrees();
-    is_between(&shape.range_m, y_m.hypot(above_m))
-        && is_between(&shape.elevation_deg, elevation_deg)
+    let g = &plan.geometry;
+    let off_s = |line: usize| (plan.wind.start_s + g.line_time_s[line] - vortex.time_s).abs();
+    let passing = (0..g.line_time_s.len()).min_by(|a, b| off_s(*a).total_cmp(&off_s(*b)));
+    let Some(line) = passing else { return false };
+    let crossing = g.schedule.crossing(line, vortex.place_m());
+    is_between(&shape.range_m, crossing.range_m)
+        && is_between(&shape.elevation_deg, crossing.elevation_rad.to_degrees())
 }
 
 /// Whether a value lies within the smallest and the largest one.
@@ -259,21 +261,24 @@ fn is_between(values: &[f64], value: f64) -> bool {
     (least..=most).contains(&value)
 }
 
-/// Age of the pair in t V0/b0 when each scan begins; NaN before the passage, and without a pair.
+/// Age of the pair in t V0/b0 when each scan begins, where the plane of its first line crosses the place of the release; NaN before the
+/// passage, and without a pair.
 fn wake_ages_tau(plan: &Plan, shape: &Shape) -> Vec<f64> {
     let mut ages = vec![f64::NAN; shape.scans];
     let scene = plan.scene();
     let Some(pair) = scene.flow.pair().filter(|pair| pair.circulation_m2_s > 0.0) else {
         return ages;
     };
-    let since_s = pair.aircraft.map_or(plan.wind.start_s, |aircraft| {
-        (aircraft.x_m - scene.scan.lidar.x_m) / aircraft.speed_m_s
-    });
     let unit_s = vortex_pair(pair).time_s(1.0);
     let schedule = &plan.geometry.schedule;
     for (scan, age) in ages.iter_mut().enumerate() {
-        let first = &schedule.lines[scan * shape.elevation_deg.len()];
-        let age_s = since_s + first.tick * schedule.prt_s;
+        let first = scan * shape.elevation_deg.len();
+        let released_m = (pair.lateral_position_m, pair.height_m);
+        let x_m = schedule.crossing(first, released_m).x_m;
+        let since_s = pair.aircraft.map_or(plan.wind.start_s, |aircraft| {
+            (aircraft.x_m - x_m) / aircraft.speed_m_s
+        });
+        let age_s = since_s + schedule.lines[first].tick * schedule.prt_s;
         // A passage when a scan begins is rounded.
         if age_s >= -1e-9 {
             *age = age_s.max(0.0) / unit_s;
@@ -282,7 +287,7 @@ fn wake_ages_tau(plan: &Plan, shape: &Shape) -> Vec<f64> {
     ages
 }
 
-/// The mean wind at some heights, m/s, without vortices and turbulence.
+/// The mean wind at some heights over the origin when the scan begins, m/s, without vortices and turbulence.
 fn mean_wind_m_s(scene: &SceneFile, heights_m: &[f64]) -> Result<Vec<[f64; 3]>, Error> {
     let pair = scene.content.flow.pair();
     let wind = mean_winds(pair.map_or(0.0, |pair| pair.cross_wind_m_s), scene)?;

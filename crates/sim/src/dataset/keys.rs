@@ -56,10 +56,7 @@ table! {
         /// Flights for training, validation and tests.
         split: SplitKeys = SplitKeys::default(),
         /// Rows of a table of keys, of which each flight draws one as a whole.
-        flight_rows: Vec<FlightRows> as omitted = Vec::new() => Is(
-            |rows: &Vec<FlightRows>| rows.len() <= 1,
-            "one table",
-        ),
+        flight_rows: Vec<FlightRows> as omitted = Vec::new(),
     }
 }
 
@@ -118,11 +115,23 @@ impl PlanKeys {
 
     /// Limits between keys.
     pub(super) fn check_between(&self, c: &mut Checker<'_>) {
-        c.compare(
-            ["flights_per_chunk", "flights_per_site"],
-            [self.flights_per_chunk, self.flights_per_site],
-            "at most",
+        let tables = self.flight_rows.len();
+        if tables > 1 {
+            let allowed = format!("at most one [[flight_rows]]: there are {tables}");
+            c.refuse("flight_rows", "", allowed);
+        }
+        let chunk = self.flights_per_chunk;
+        let of_site = self.flights_per_site;
+        let fewer = format!("at most flights_per_site, {of_site}");
+        // A chunk that the plan states is blamed itself.
+        let more = format!(
+            "at least flights_per_chunk, which is {chunk} by default: flights_per_chunk = {of_site} allows it"
         );
+        let sides = [
+            ("flights_per_chunk", chunk.to_string(), fewer),
+            ("flights_per_site", of_site.to_string(), more),
+        ];
+        c.between(chunk <= of_site, &sides);
         let held = self.split.home * self.flights_per_site as f64;
         let allowed = "0, or a fraction of flights_per_site that is a whole number of flights";
         c.require(held.fract() == 0.0, "split.home", self.split.home, allowed);

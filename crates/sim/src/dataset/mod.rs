@@ -7,6 +7,7 @@
 //! | `draw` | distributions and the sequence of their numbers |
 //! | [`presets`] | plans that come with the program |
 //! | `schema`, `documents` | arrays and coordinates; the files beside them |
+//! | `refusals` | plans whose vortices have no truth |
 //! | `flight` | one flight, measured and packed |
 //! | [`mod@run`] | chunk after chunk of flights, in any number of processes |
 
@@ -17,6 +18,7 @@ mod flight;
 pub mod keys;
 pub mod plan;
 pub mod presets;
+mod refusals;
 pub mod run;
 mod schema;
 

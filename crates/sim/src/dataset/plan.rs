@@ -10,7 +10,9 @@ use super::drawn::{DrawnKeys, Origin};
 use super::keys::PlanKeys;
 use crate::Error;
 use crate::io::{hash_of, text_file};
-use crate::keys::{Checker, Declared as _, Format, Key, Problem, Text, keys_of, near, to_table};
+use crate::keys::{
+    Checker, Declared as _, Format, Key, Kind, Problem, Text, keys_of, near, to_table,
+};
 use crate::scene::SceneFile;
 use crate::streams::stream;
 use crate::sweep::{SceneKey, expression, number_of_key, set, text_of};
@@ -93,6 +95,7 @@ impl DatasetPlan {
         }
         let folder = path.parent().unwrap_or(Path::new(""));
         let drawn = DrawnKeys::new(&site, &flight, keys.flight_rows.first(), folder)
+            .and_then(|drawn| drawn.with_flows_of(&base))
             .map_err(|problems| invalid(path, located_by_name(&text, problems)))?;
         let rows = drawn.rows_text.as_deref().unwrap_or_default();
         let mut plan = Self {
@@ -212,17 +215,21 @@ impl DatasetPlan {
         value.map_err(|problem| refused(format!("{} is {}", problem.allowed, problem.value)))
     }
 
+    /// A refusal of keys of the scene, with their lines.
+    pub(super) fn refused(&self, problems: Vec<Problem>) -> Error {
+        self.relocated(invalid(&self.path, problems))
+    }
+
     /// An error of a drawn scene with the lines of the plan: its own text is that of no file.
     fn relocated(&self, mut error: Error) -> Error {
         if let Error::Invalid { problems, .. } = &mut error
             && let Ok(document) = Text::parse(&self.text, &self.path)
         {
             for problem in problems {
-                let drawn = self
-                    .drawn
-                    .keys
-                    .iter()
-                    .find(|(key, _)| key.path == problem.key);
+                // Scenes write added_flows[0], plans added_flows.0.
+                let path = problem.key.replace('[', ".").replace(']', "");
+                let mut drawn = self.drawn.keys.iter();
+                let drawn = drawn.find(|(key, _)| key.path == path);
                 problem.line = match drawn {
                     Some((key, _)) => line_of_name(&self.text, &key.name),
                     None => document.line(&format!("scene.{}", problem.key)),
@@ -320,23 +327,39 @@ fn with_seed(text: &str, seed: u64) -> String {
 
 /// Refuses keys that are neither of plans nor tables with keys of scenes.
 fn refuse_unknown(skipped: &[String], c: &mut Checker<'_>) {
-    let keys = plan_format().keys;
     for path in skipped {
         if OF_SCENES.contains(&path.as_str()) {
             continue;
         }
-        let names = keys.iter().map(|key| key.name).chain(OF_SCENES);
-        let hint = near(path, names).map(|name| format!(", did you mean {name}?"));
+        let (table, name) = path.rsplit_once('.').unwrap_or(("", path.as_str()));
+        let known = known_names(table);
+        let meant = near(name, known.iter().copied());
+        let hint = meant.map(|name| format!(", did you mean {name}?"));
         let hint = hint.unwrap_or_default();
-        let known: Vec<&str> = keys.iter().map(|key| key.name).chain(OF_SCENES).collect();
-        c.refuse(
-            path,
-            "",
-            format!(
-                "there is no such key{hint}; known here: {}",
-                known.join(", ")
-            ),
+        let allowed = format!(
+            "there is no such key{hint}; known here: {}",
+            known.join(", ")
         );
+        c.refuse(path, "", allowed);
+    }
+}
+
+/// Names of the keys of a table of a plan; of the plan itself where its path is empty.
+fn known_names(table: &str) -> Vec<&'static str> {
+    let keys = plan_format().keys;
+    let name = table.split('[').next().unwrap_or_default();
+    let own = keys.iter().find(|key| key.name == name);
+    let inner = own.and_then(|key| match &key.kind {
+        Kind::Table(inner) => Some(inner),
+        Kind::List { of, .. } => match &**of {
+            Kind::Table(inner) => Some(inner),
+            _ => None,
+        },
+        _ => None,
+    });
+    match inner {
+        Some(inner) => inner.iter().map(|key| key.name).collect(),
+        None => keys.iter().map(|key| key.name).chain(OF_SCENES).collect(),
     }
 }
 
@@ -403,19 +426,27 @@ fn located_by_name(text: &str, mut problems: Vec<Problem>) -> Vec<Problem> {
     problems
 }
 
-/// The line of a key in quotation marks, from 1.
+/// The line in `[site]` or `[flight]` of a key in quotation marks, from 1. Other tables may have keys of the same name.
 fn line_of_name(text: &str, name: &str) -> Option<usize> {
     let quoted = [
         format!("\"{name}\""),
         format!("'{name}'"),
         format!("{name} "),
+        format!("{name}="),
     ];
-    let is_of_name = |line: &str| {
-        quoted
-            .iter()
-            .any(|quoted| line.trim_start().starts_with(quoted.as_str()))
-    };
-    text.lines().position(is_of_name).map(|line| line + 1)
+    let mut is_drawn = false;
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim_start();
+        if let Some(header) = line.strip_prefix('[') {
+            let table = header.split(']').next().unwrap_or_default().trim();
+            is_drawn = ["site", "flight"].contains(&table);
+        }
+        let begins = |quoted: &String| line.starts_with(quoted.as_str());
+        if is_drawn && quoted.iter().any(begins) {
+            return Some(index + 1);
+        }
+    }
+    None
 }
 
 #[cfg(test)]

@@ -59,6 +59,33 @@ fn a_distribution_that_is_appended_moves_no_other() {
 }
 
 #[test]
+fn expressions_compute_with_keys_of_added_flows() {
+    let tables = "[[scene.added_flows]]\nkind = \"calm\"\n[[scene.added_flows]]\nkind = \"eddies\"\n\
+                  [flight]\n\"added_flows.1.dissipation_m2_s3\" = { uniform = [1e-3, 1e-2] }\n\
+                  \"added_flows.1.outer_scale_m\" = \"50 + 1000*added_flows.1.dissipation_m2_s3\"\n";
+    let drawn = plan(&with("", tables)).unwrap();
+    drawn.check().unwrap();
+    let scene = drawn.flight(1).unwrap().scene;
+    let eddies = scene.content.eddies().unwrap();
+    let expected_m = 50.0 + 1000.0 * eddies.dissipation_m2_s3;
+    assert_eq!(eddies.outer_scale_m, expected_m);
+    for (from, wanted) in [
+        (
+            "added_flows.2",
+            "added_flows.2.dissipation_m2_s3 is not a key",
+        ),
+        (
+            "added_flows.0",
+            "added_flows.0.dissipation_m2_s3 is not a key",
+        ),
+    ] {
+        let other = tables.replace("*added_flows.1", &format!("*{from}"));
+        let refusal = message("", &other);
+        assert!(refusal.contains(wanted), "{refusal}");
+    }
+}
+
+#[test]
 fn another_seed_takes_the_place_of_that_of_the_text() {
     let first = plan(TINY).unwrap();
     let other = DatasetPlan::parse(TINY, Path::new("p.toml"), Some(7)).unwrap();
@@ -91,7 +118,13 @@ fn rows_are_drawn_as_wholes_by_their_weights() {
         largest += usize::from(pair.spacing_m == 60.0);
     }
     assert_eq!(largest, 48);
+    std::fs::write(temp.path().join("bad.csv"), table.replace("60", "x")).unwrap();
     for (from, to, wanted) in [
+        (
+            "\"aircraft.csv\"",
+            "\"bad.csv\"",
+            "flow.spacing_m = x is not allowed: a number, e.g. 1.5e-6; it is in row 3 of bad.csv",
+        ),
         ("\"aircraft.csv\"", "\"none.csv\"", "can be read"),
         ("\"aircraft.csv\"", "\"../aircraft.csv\"", "plain file name"),
         ("= \"weight\"", "= \"wait\"", "a column of"),
@@ -105,6 +138,41 @@ fn rows_are_drawn_as_wholes_by_their_weights() {
 #[test]
 fn keys_that_are_not_allowed_are_refused_with_their_line_and_what_is() {
     for (head, tables, wanted) in [
+        (
+            "split.foo = 1",
+            "",
+            "p.toml:5: split.foo = 1 is not allowed: there is no such key; known here: test_away, home",
+        ),
+        (
+            "",
+            "[[flight_rows]]\nfile = \"a.csv\"\nfle = \"a.csv\"",
+            "did you mean file?; known here: file, weight",
+        ),
+        (
+            "",
+            "[[flight_rows]]\nfile = \"a.csv\"\n[[flight_rows]]\nfile = \"b.csv\"",
+            "flight_rows is not allowed: at most one [[flight_rows]]: there are 2",
+        ),
+        (
+            "seed = 3",
+            "[flight]\n\"seed\" = { uniform = [1.0, 2.0] }",
+            "p.toml:10: seed is not allowed: a key that does not set",
+        ),
+        (
+            "",
+            "[[scene.added_flows]]\nkind = \"eddies\"\n[flight]\n\"added_flows.1.smallest_m\" = { uniform = [3.0, 4.0] }",
+            "p.toml:12: added_flows.1.smallest_m is not allowed: number 0 of added_flows",
+        ),
+        (
+            "",
+            "[flight]\n\"added_flows.0.smallest_m\" = \"3\"",
+            "added_flows.0.smallest_m is not allowed: a plan with [[scene.added_flows]]",
+        ),
+        (
+            "",
+            "[[scene.added_flows]]\nkind = \"eddies\"\n[flight]\n\"added_flows.0.smallest_m\" = { uniform = [1e-4, 1e-3] }",
+            "p.toml:12: added_flows[0].smallest_m = ",
+        ),
         (
             "colour = 1",
             "",
@@ -227,6 +295,9 @@ fn keys_that_are_not_allowed_are_refused_with_their_line_and_what_is() {
         };
         assert!(refusal.contains(wanted), "{head} {tables}: {refusal}");
     }
+    let refusal = plan("title = \"t\"\nflights_per_site = 8\n").unwrap_err();
+    let wanted = "p.toml:2: flights_per_site = 8 is not allowed: at least flights_per_chunk, which is 16 by default";
+    assert!(refusal.to_string().contains(wanted), "{refusal}");
     for flights in ["7", "12", "131072"] {
         let text = with("", "").replace(
             "flights_per_site = 8",

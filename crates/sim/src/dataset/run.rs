@@ -9,6 +9,7 @@
 use super::documents;
 use super::flight;
 use super::plan::{DatasetPlan, Flight};
+use super::refusals::refuse_without_truth;
 use super::schema::{self, Shape};
 use super::{PLAN, STORE};
 use crate::Error;
@@ -70,7 +71,8 @@ impl<'p> Dataset<'p> {
     /// Draws all flights, and plans those at the ends of each distribution.
     ///
     /// # Errors
-    /// The first flight that is refused; shapes that differ between flights; more flights of a site than it has.
+    /// The first flight that is refused; shapes that differ between flights; vortices without truth; more flights of a site than it
+    /// has.
     pub fn new(plan: &'p DatasetPlan, settings: Settings) -> Result<Self, Error> {
         let of_site = plan.keys.flights_per_site;
         if let Some(flights) = settings
@@ -88,6 +90,7 @@ impl<'p> Dataset<'p> {
             let of_flight = |error| refused(plan, &flight, error);
             let planned = flight::planned(&flight.scene, &common).map_err(of_flight)?;
             let shape = Shape::new(&planned, plan.keys.spectra).map_err(of_flight)?;
+            refuse_without_truth(plan, &planned, &shape)?;
             match &first {
                 Some((known, _)) => schema::refuse_other_shape(plan, &flight, [&shape, known])?,
                 None => first = Some((shape, planned)),

@@ -113,6 +113,14 @@ impl TextTable {
             .or_else(|| column(&|own| own.ends_with(']') && split_unit(own).0 == name))
     }
 
+    /// Number of columns that [`TextTable::column`] could find by a name.
+    pub fn columns_of(&self, name: &str) -> usize {
+        let is_it = |own: &&String| {
+            own.eq_ignore_ascii_case(name) || (own.ends_with(']') && split_unit(own).0 == name)
+        };
+        self.header.iter().filter(is_it).count()
+    }
+
     /// A cell as a number; NaN where it is empty or none.
     pub fn number(&self, row: usize, column: usize) -> f64 {
         let Some(cell) = self.rows.get(row).and_then(|cells| cells.get(column)) else {

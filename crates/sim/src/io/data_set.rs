@@ -127,13 +127,22 @@ impl DataSet {
     /// # Errors
     /// The first such split.
     pub fn check_splits(&self, splits: &[Split]) -> Result<(), Error> {
-        for split in splits {
-            if !self.splits.contains(&Some(*split)) {
-                let reason = format!("no flight of its split {} is ready", split.name());
-                return Err(Error::input(&self.store.root, reason));
-            }
+        let absent = splits
+            .iter()
+            .find(|split| !self.splits.contains(&Some(**split)));
+        let Some(absent) = absent else { return Ok(()) };
+        let absent = absent.name();
+        let mut reason = match self.splits.iter().all(Option::is_some) {
+            true => format!("it has no flight of the split {absent}"),
+            false => format!("no flight of its split {absent} is ready"),
+        };
+        let mut there = Split::ALL.to_vec();
+        there.retain(|split| self.splits.contains(&Some(*split)));
+        if !there.is_empty() {
+            let names: Vec<&str> = there.into_iter().map(Split::name).collect();
+            reason += &format!(": --split {} names those that it has", names.join(","));
         }
-        Ok(())
+        Err(Error::input(&self.store.root, reason))
     }
 
     /// The plan that it was made from, and its seed.

@@ -567,9 +567,12 @@ pub(crate) fn lines_with_keys(toml: &str) -> impl Iterator<Item = (String, &str)
     })
 }
 
-/// The value of the key with this path.
+/// The value of the key with this path; a number in it is that of a table of a list.
 pub(crate) fn value_at<'v>(table: &'v Value, path: &str) -> Option<&'v Value> {
-    path.split('.').try_fold(table, |table, key| table.get(key))
+    path.split('.').try_fold(table, |above, key| match above {
+        Value::Array(list) => list.get(key.parse::<usize>().ok()?),
+        _ => above.get(key),
+    })
 }
 
 fn names(kinds: &AllKinds) -> Vec<&'static str> {

@@ -23,23 +23,30 @@ const REACH_OVER_SPACING: f64 = 0.15;
 /// Most rounds to a centre or a time.
 const ROUNDS: usize = 20;
 
-/// Place (y, z), m, and time, s, of a centre when the line of sight passes it.
-type Passage = ((f64, f64), f64);
+/// A centre when the line of sight passes it.
+#[derive(Debug, Clone, Copy)]
+struct Passage {
+    /// Its place (y, z), m.
+    place_m: (f64, f64),
+    time_s: f64,
+    /// Where the plane of the line crosses it, m along the flight.
+    x_m: f64,
+}
 
 /// A vortex with its circulation and the mean of that over 5 to 15 m, m^2/s; NaN for what cannot be known.
 fn exact(
     side: Side,
-    (place_m, time_s): Passage,
+    passage: Passage,
     [circulation, mean]: [f64; 2],
     core_m: Option<f64>,
 ) -> VortexResult {
     VortexResult {
         side,
-        time_s,
+        time_s: passage.time_s,
         circulation_m2_s: known(circulation),
         circulation_5_15_m2_s: known(mean),
-        lateral_position_m: known(place_m.0),
-        height_m: known(place_m.1),
+        lateral_position_m: known(passage.place_m.0),
+        height_m: known(passage.place_m.1),
         core_radius_m: core_m.map(known),
     }
 }
@@ -49,8 +56,12 @@ fn known(value: f64) -> Measured {
 }
 
 /// A vortex that is not there, since the aircraft has not passed yet.
-fn absent(side: Side, time_s: f64) -> VortexResult {
-    exact(side, ((f64::NAN, f64::NAN), time_s), [0.0, 0.0], None)
+fn absent(side: Side, passage: Passage) -> VortexResult {
+    let nowhere = Passage {
+        place_m: (f64::NAN, f64::NAN),
+        ..passage
+    };
+    exact(side, nowhere, [0.0, 0.0], None)
 }
 
 /// Whether the air has this vortex.
@@ -84,18 +95,14 @@ fn of_pair(
     pair: &VortexPair,
     side: Side,
 ) -> Result<VortexResult, Error> {
-    // Behind an aircraft, the wake in the plane of the scan has its age there.
-    let x_m = plan.scene().scan.lidar.x_m;
-    let since_s = pair
-        .aircraft
-        .map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
-    let passage = when_passed(plan, lines, |time_s| {
-        let vortex = vortex_of(plan.wind.pair.as_ref(), side, time_s + since_s)?;
+    let passage = when_passed(plan, lines, |time_s, x_m| {
+        let age_s = time_s + passed_since_s(pair, x_m);
+        let vortex = vortex_of(plan.wind.pair.as_ref(), side, age_s)?;
         Ok((vortex.lateral_position_m, vortex.height_m))
     })?;
-    let age_s = passage.1 + since_s;
+    let age_s = passage.time_s + passed_since_s(pair, passage.x_m);
     if pair.aircraft.is_some() && age_s < 0.0 {
-        return Ok(absent(side, passage.1));
+        return Ok(absent(side, passage));
     }
     let vortex = vortex_of(plan.wind.pair.as_ref(), side, age_s)?;
     let circulation_m2_s = vortex.circulation_m2_s.abs();
@@ -106,6 +113,14 @@ fn of_pair(
         [circulation_m2_s, mean_m2_s],
         Some(pair.core_radius_m),
     ))
+}
+
+/// How long before the start of the scan the aircraft passed a position along the flight, m, in s; 0 for a wake of one age everywhere.
+fn passed_since_s(pair: &VortexPair, x_m: f64) -> f64 {
+    match pair.aircraft {
+        Some(aircraft) => (aircraft.x_m - x_m) / aircraft.speed_m_s,
+        None => 0.0,
+    }
 }
 
 /// A vortex of the analytic pair at an age, s; nowhere in a plan without one.
@@ -145,45 +160,60 @@ pub(crate) fn true_wake(truth: &[VortexResult; 2]) -> Option<Wake> {
     wake.validate().is_ok().then_some(wake)
 }
 
-/// Place of a centre that moves, and the time, when the line of sight passes it.
+/// When one of some lines of sight passes a centre, which is a function of the time, s, and of the position along the flight, m: that line is
+/// nearest in elevation, seen from where the lidar is then.
 fn when_passed(
     plan: &Plan,
     lines: &[usize],
-    centre: impl Fn(f64) -> Result<(f64, f64), Error>,
+    centre: impl Fn(f64, f64) -> Result<(f64, f64), Error>,
 ) -> Result<Passage, Error> {
     let g = &plan.geometry;
-    let lidar_m = plan.scene().scan.lidar_height_m;
     let times_s = lines.iter();
     let times_s = times_s.map(|line| plan.wind.start_s + g.line_time_s[*line]);
-    let mut time_s = times_s.sum::<f64>() / lines.len().max(1) as f64;
-    let mut place_m = centre(time_s)?;
+    let time_s = times_s.sum::<f64>() / lines.len().max(1) as f64;
+    let x_m = plan.scene().scan.lidar.x_m;
+    let mut passage = Passage {
+        place_m: centre(time_s, x_m)?,
+        time_s,
+        x_m,
+    };
     for _ in 0..ROUNDS {
-        let elevation_rad = (place_m.1 - lidar_m).atan2(place_m.0);
-        let line = lines.iter().copied().min_by(|a, b| {
-            let [a, b] = [a, b].map(|line| (g.elevation_rad[*line] - elevation_rad).abs());
-            a.total_cmp(&b)
-        });
-        let next_s = plan.wind.start_s + line.map_or(0.0, |line| g.line_time_s[line]);
-        if next_s == time_s {
+        let off_rad = |line: usize| {
+            let crossing = g.schedule.crossing(line, passage.place_m);
+            (g.elevation_rad[line] - crossing.elevation_rad).abs()
+        };
+        let nearest = lines
+            .iter()
+            .copied()
+            .min_by(|a, b| off_rad(*a).total_cmp(&off_rad(*b)));
+        let Some(line) = nearest else { break };
+        let time_s = plan.wind.start_s + g.line_time_s[line];
+        let x_m = g.schedule.crossing(line, passage.place_m).x_m;
+        if (time_s, x_m) == (passage.time_s, passage.x_m) {
             break;
         }
-        time_s = next_s;
-        place_m = centre(time_s)?;
+        passage = Passage {
+            place_m: centre(time_s, x_m)?,
+            time_s,
+            x_m,
+        };
     }
-    Ok((place_m, time_s))
+    Ok(passage)
 }
 
 fn simulated(plan: &Plan, lines: &[usize], side: Side) -> Result<VortexResult, Error> {
     let sense = if side == Side::Left { -1.0 } else { 1.0 };
-    let passage @ ((y_m, z_m), time_s) = when_passed(plan, lines, |time_s| {
-        let left = strongest(plan, time_s, -1.0)?;
-        let right = strongest(plan, time_s, 1.0)?;
+    let first = lines.first().copied().unwrap_or(0);
+    let passage = when_passed(plan, lines, |time_s, _| {
+        let left = strongest(plan, first, time_s, -1.0)?;
+        let right = strongest(plan, first, time_s, 1.0)?;
         let reach_m = REACH_OVER_SPACING * (left.0 - right.0).hypot(left.1 - right.1);
         let first_m = if side == Side::Left { left } else { right };
         centroid(plan, time_s, first_m, sense, reach_m)
     })?;
     let wind = plan.wind.without_eddies();
-    let mean_m2_s = mean_circulation_5_15_m2_s(wind, [y_m, z_m], time_s, CIRCLE)?;
+    let centre_m = [passage.place_m.0, passage.place_m.1];
+    let mean_m2_s = mean_circulation_5_15_m2_s(wind, centre_m, passage.time_s, CIRCLE)?;
     Ok(exact(side, passage, [f64::NAN, sense * mean_m2_s], None))
 }
 
@@ -226,8 +256,8 @@ fn vorticity(
     Ok(known)
 }
 
-/// The place of the scan where the vorticity of a sign is strongest.
-fn strongest(plan: &Plan, time_s: f64, sense: f64) -> Result<(f64, f64), Error> {
+/// The place of the scan with this first line where the vorticity of a sign is strongest.
+fn strongest(plan: &Plan, first: usize, time_s: f64, sense: f64) -> Result<(f64, f64), Error> {
     let scan = &plan.scene().scan;
     let g = &plan.geometry;
     let top = g
@@ -235,10 +265,14 @@ fn strongest(plan: &Plan, time_s: f64, sense: f64) -> Result<(f64, f64), Error> 
         .iter()
         .fold(0.0_f64, |top, e| top.max(*e))
         .min(std::f64::consts::FRAC_PI_2);
+    let beam = g.schedule.middle(first);
+    let ahead = g.schedule.ahead(&beam);
+    let [near_m, far_m] = [scan.range_min_m * top.cos(), scan.range_max_m]
+        .map(|range_m| ahead.at_range_m(beam.position_m, range_m)[1]);
     let sector = (
-        (scan.range_min_m * top.cos(), COARSE_M),
+        (near_m.min(far_m), COARSE_M),
         (
-            scan.range_max_m,
+            near_m.max(far_m),
             scan.lidar_height_m + scan.range_max_m * top.sin(),
         ),
     );
@@ -347,6 +381,84 @@ mod tests {
                 assert_eq!(vortex.circulation_5_15_m2_s.value, 0.0);
                 assert!(vortex.lateral_position_m.value.is_nan());
             }
+        }
+    }
+
+    /// A scan of the default pair at a distance, m, by a lidar with an azimuth, rad, a lateral position, m, and a velocity, m/s.
+    fn seen_from(
+        lateral_position_m: f64,
+        azimuth_rad: f64,
+        y_m: f64,
+        velocity_m_s: [f64; 3],
+    ) -> Plan {
+        let mut scene = Scene::default();
+        scene.detector.snr = SnrReference::Fixed { snr_db: 0.0 };
+        scene.scan.azimuth_rad = azimuth_rad;
+        scene.scan.lidar.flight_azimuth_rad = Some(0.0);
+        scene.scan.lidar.y_m = y_m;
+        scene.scan.lidar.velocity_m_s = velocity_m_s;
+        if let Flow::VortexPair(pair) = &mut scene.flow {
+            pair.lateral_position_m = lateral_position_m;
+        }
+        Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap()
+    }
+
+    #[test]
+    fn the_line_that_passes_a_vortex_depends_on_where_the_lidar_is_and_looks() {
+        let quarter_rad = std::f64::consts::FRAC_PI_2;
+        for (pair_y_m, azimuth_rad, lidar_y_m, speed_m_s) in [
+            (520.0, quarter_rad, 120.0, 0.0),
+            (-400.0, 3.0 * quarter_rad, 0.0, 0.0),
+            (280.0, 0.5 * quarter_rad, 0.0, 0.0),
+            (400.0, quarter_rad, 0.0, -20.0),
+        ] {
+            let plan = seen_from(pair_y_m, azimuth_rad, lidar_y_m, [0.0, speed_m_s, 0.0]);
+            for vortex in true_vortices(&plan, &lines(&plan)).unwrap() {
+                let (y_m, z_m) = vortex.place_m();
+                let lidar_m = lidar_y_m + speed_m_s * vortex.time_s;
+                let distance_m = (y_m - lidar_m) / azimuth_rad.sin();
+                let times_s = &plan.geometry.line_time_s;
+                let line = times_s.iter().position(|time_s| *time_s == vortex.time_s);
+                let off_rad = plan.geometry.elevation_rad[line.unwrap()] - z_m.atan2(distance_m);
+                assert!(off_rad.abs() < 0.8e-3, "{azimuth_rad} {off_rad}");
+            }
+        }
+    }
+
+    #[test]
+    fn in_an_oblique_plane_the_wake_has_the_age_of_the_place_where_it_is_crossed() {
+        let mut scene = seen_from(280.0, std::f64::consts::FRAC_PI_4, 0.0, [0.0; 3])
+            .scene()
+            .clone();
+        if let Flow::VortexPair(pair) = &mut scene.flow {
+            pair.motion = VortexMotion::Inviscid;
+            pair.aircraft = Some(crate::scene::Aircraft {
+                speed_m_s: 70.0,
+                x_m: 1400.0,
+            });
+        }
+        let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap();
+        let [left, right] = true_vortices(&plan, &lines(&plan)).unwrap();
+        let pair = vortex_pair(plan.scene().flow.pair().unwrap());
+        for (vortex, side) in [(left, 0), (right, 1)] {
+            // At 45 degrees it is crossed as far along the flight as across it.
+            let age_s = vortex.time_s + (1400.0 - vortex.lateral_position_m.value) / 70.0;
+            let expected = pair.vortices(age_s)[side];
+            let off_m = vortex.lateral_position_m.value - expected.lateral_position_m;
+            assert!(off_m.abs() < 1e-6, "{off_m}");
+            assert!((vortex.height_m.value - expected.height_m).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn vortices_are_found_in_simulated_wind_on_either_side_of_the_lidar() {
+        let back_rad = 3.0 * std::f64::consts::FRAC_PI_2;
+        let plan = seen_from(-400.0, back_rad, 0.0, [0.0; 3]);
+        let truth = true_vortices(&plan, &lines(&plan)).unwrap();
+        for (side, truth) in [Side::Left, Side::Right].into_iter().zip(truth) {
+            let found = simulated(&plan, &lines(&plan), side).unwrap();
+            let away_m = found.lateral_position_m.value - truth.lateral_position_m.value;
+            assert!(away_m.abs() < 0.3, "{found:?} {truth:?}");
         }
     }
 

@@ -171,7 +171,7 @@ impl Predictions {
     /// Reads the text of a file at `path` for the splits that are scored.
     ///
     /// # Errors
-    /// With row and column: a column that is missing, text or an infinity for a number, a vortex without a place or a
+    /// With row and column: a column that is missing or there twice, text or an infinity for a number, a vortex without a place or a
     /// circulation, a deviation that is not positive, an unknown side, a flight or scan that the data set does not have, `none`
     /// beside a vortex, more than [`MOST_VORTICES`]; a scan without a row.
     pub fn parse(
@@ -267,7 +267,7 @@ impl<'t> Columns<'t> {
         let mut deviations = [None; 3];
         for (index, quantity) in Quantity::ALL.into_iter().enumerate() {
             values[index] = needed(table, quantity.name())?;
-            deviations[index] = table.column(quantity.deviation_name());
+            deviations[index] = single(table, quantity.deviation_name())?;
         }
         Ok(Self {
             table,
@@ -276,17 +276,27 @@ impl<'t> Columns<'t> {
             side: needed(table, "side")?,
             values,
             deviations,
-            score: table.column("score"),
+            score: single(table, "score")?,
         })
     }
 }
 
 /// The index of a column that predictions must have.
 fn needed(table: &TextTable, name: &str) -> Result<usize, String> {
-    table.column(name).ok_or_else(|| {
+    single(table, name)?.ok_or_else(|| {
         let names = "flight, scan, side, y_m, z_m and gamma_5_15_m2_s";
         format!("it has no column {name}: predictions have {names}")
     })
+}
+
+/// The index of a column that predictions may have once.
+fn single(table: &TextTable, name: &str) -> Result<Option<usize>, String> {
+    match table.columns_of(name) {
+        0 | 1 => Ok(table.column(name)),
+        count => Err(format!(
+            "it has {count} columns {name}: predictions have one of that name"
+        )),
+    }
 }
 
 impl Columns<'_> {
@@ -533,6 +543,26 @@ mod tests {
         // Numbers that are not known do not compare.
         assert_eq!(format!("{:?}", read.scans[&(1, 0)]), format!("{found:?}"));
         assert_eq!(read.scans[&(1, 1)], PredictedScan::default());
+    }
+
+    #[test]
+    fn a_column_that_is_there_twice_is_named() {
+        for (name, other) in [
+            ("y_m", "y_m"),
+            ("gamma_5_15_m2_s", "Gamma_5_15_m2_s"),
+            ("y_std_m", "y_std_m"),
+            ("score", "score"),
+        ] {
+            let text = format!("{HEADER},{other}\n1,0,none,,,,,,,\n1,1,none,,,,,,,\n");
+            let refused = Predictions::read(&text, &truth(), &ScoreOptions::default());
+            let wanted = format!("it has 2 columns {name}: ");
+            let refused = refused.unwrap_err();
+            assert!(refused.starts_with(&wanted), "{refused}");
+        }
+        // Those that are not read may be there twice.
+        let text = format!("{HEADER},note\n1,0,none,,,,,,,\n1,1,none,,,,,,,\n");
+        let read = Predictions::read(&text, &truth(), &ScoreOptions::default());
+        assert_eq!(read.unwrap().scans.len(), 2);
     }
 
     #[test]

@@ -121,6 +121,28 @@ fn methods_find_the_wakes_of_another_site_alike_for_any_number_of_threads() {
 }
 
 fn refusals(folder: &Path) {
+    let beside = PLAN.replace(
+        "pulses_per_line = 4",
+        "pulses_per_line = 1\nlidar = { y_m = 10.0 }",
+    );
+    fs::write(folder.join("q.toml"), beside).unwrap();
+    let words = [
+        "dataset",
+        "q.toml",
+        "--out",
+        "e",
+        "--quiet",
+        "--flights",
+        "1",
+    ];
+    stdout(folder, &words);
+    for method in ["retrieve", "detect"] {
+        let text = refused(folder, &[method, "e", "--split", "train", "--out", "o"]);
+        assert!(
+            text.contains("scan.lidar: retrieve and detect need"),
+            "{text}"
+        );
+    }
     for (words, message) in [
         (
             &["retrieve", "d", "--scene", "p.toml"][..],

@@ -197,6 +197,112 @@ fn cells_are_those_of_a_run_of_the_scene_and_vortices_are_where_lines_pass_them(
     assert!(wakes >= 12, "{wakes}");
 }
 
+/// A plan of eight flights with a pair at rest at a lateral position, m, and further keys of the scan and tables.
+fn still_plan(lateral_position_m: f64, scan: &str, tables: &str) -> String {
+    format!(
+        "title = \"still\"\nsites = 1\nflights_per_site = 8\nflights_per_chunk = 8\nempty = 0.0\nspectra = false\n\
+         [scene.detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n\
+         [scene.flow]\nkind = \"vortex_pair\"\nmotion = \"frozen\"\nlateral_position_m = {lateral_position_m:?}\n\
+         [scene.scan]\nrange_max_m = 560.0\npulses_per_line = 1\n{scan}\n\
+         [scene.estimator]\ngate_step_samples = 10\n{tables}\n\
+         [flight]\n\"flow.height_m\" = {{ uniform = [36.0, 44.0] }}\n"
+    )
+}
+
+#[test]
+fn vortices_are_in_view_wherever_the_lidar_is_and_looks() {
+    let temp = tempfile::tempdir().unwrap();
+    let at = temp.path();
+    let mut times_s = Vec::new();
+    let back = "azimuth_rad = 4.71238898038469\nlidar = { flight_azimuth_rad = 0.0 }";
+    let oblique = "azimuth_rad = 0.7853981633974483\nlidar = { flight_azimuth_rad = 0.0 }";
+    for (lateral_position_m, lidar) in [
+        (400.0, ""),
+        (520.0, "lidar = { y_m = 120.0 }"),
+        (-400.0, back),
+        (300.0, oblique),
+        (400.0, "lidar = { velocity_m_s = [0.0, -20.0, 0.0] }"),
+    ] {
+        let scan = format!("elevation_step_rad = 0.01\n{lidar}");
+        let text = still_plan(lateral_position_m, &scan, "");
+        std::fs::write(at.join("p.toml"), text).unwrap();
+        let out = format!("d{}", times_s.len());
+        ran(at, &["--out", &out, "--flights", "2"]);
+        let store = Store::open(&at.join(out).join("scans.zarr")).unwrap();
+        let in_view = store.values("in_view", 0..2).unwrap();
+        assert!(in_view.iter().all(|value| *value == 1.0), "{lidar}");
+        times_s.push(store.values("passing_time", 0..2).unwrap());
+    }
+    assert_eq!(times_s[0], times_s[1]);
+    for flight in 0..2 {
+        // On the other side the right vortex is the nearer one.
+        assert_eq!(times_s[0][[flight, 0, 0]], times_s[2][[flight, 0, 1]]);
+        assert_eq!(times_s[0][[flight, 0, 1]], times_s[2][[flight, 0, 0]]);
+    }
+}
+
+#[test]
+fn the_true_wind_is_the_sum_of_all_mean_winds() {
+    let temp = tempfile::tempdir().unwrap();
+    let at = temp.path();
+    let winds = "[[scene.added_flows]]\nkind = \"linear\"\nvelocity_m_s = [1.0, 2.0, 0.0]\ngradient_v_per_s = [1e-3, 1e-3, 0.01]\n\
+                 [[scene.added_flows]]\nkind = \"uniform\"\nlateral_m_s = 0.5\nvertical_m_s = 0.1";
+    let text = still_plan(400.0, "elevation_step_rad = 0.05", winds);
+    std::fs::write(at.join("p.toml"), text).unwrap();
+    ran(at, &["--out", "d", "--flights", "1"]);
+    let store = Store::open(&at.join("d/scans.zarr")).unwrap();
+    let along_m_s = store.values("wind_x", 0..1).unwrap();
+    let across_m_s = store.values("wind_y", 0..1).unwrap();
+    for index in 0..20 {
+        let height_m = 10.0 * (index as f64 + 1.0);
+        assert_eq!(along_m_s[[0, index]], 1.0);
+        let off_m_s = across_m_s[[0, index]] - (2.5 + 0.01 * height_m);
+        assert!(off_m_s.abs() < 1e-12, "{height_m} m: {off_m_s}");
+    }
+}
+
+#[test]
+fn vortices_without_truth_are_refused_and_winds_alone_are_not() {
+    let temp = tempfile::tempdir().unwrap();
+    let at = temp.path();
+    let elevations = "elevation_step_rad = 0.01\n";
+    let ppi = "lidar = { flight_azimuth_rad = 0.0 }\npattern = { kind = \"ppi\", elevations_rad = [0.1], azimuth_min_rad = 1.2, azimuth_max_rad = 1.9, azimuth_step_rad = 0.1 }";
+    let stare = "pattern = { kind = \"stare\", elevation_rad = 0.1, lines = 3 }";
+    let along = format!("{elevations}azimuth_rad = 1.0\nlidar = {{ flight_azimuth_rad = 1.0 }}");
+    let pair = "[[scene.added_flows]]\nkind = \"calm\"\n[[scene.added_flows]]\nkind = \"vortex_pair\"\nlateral_position_m = 380.0";
+    for (scan, tables, wanted) in [
+        (
+            ppi,
+            "",
+            "p.toml:18: scan.pattern.kind = \"ppi\" is not allowed: \"rhi\"",
+        ),
+        (stare, "", "scan.pattern.kind = \"stare\" is not allowed"),
+        (
+            along.as_str(),
+            "",
+            "scan.azimuth_rad = 1.0 is not allowed: an azimuth across",
+        ),
+        (
+            elevations,
+            pair,
+            "added_flows[1].kind = \"vortex_pair\" is not allowed: a flow without vortices",
+        ),
+    ] {
+        let text = still_plan(400.0, scan, tables);
+        std::fs::write(at.join("p.toml"), &text).unwrap();
+        let message = refused(at, &["--out", "d"]);
+        assert!(message.contains(wanted), "{message}");
+        // A pair among the added flows is there in empty flights, too.
+        let text = text.replace("empty = 0.0", "empty = 1.0");
+        std::fs::write(at.join("p.toml"), &text).unwrap();
+        match tables {
+            "" => drop(ran(at, &["--check"])),
+            _ => assert!(refused(at, &["--check"]).contains(wanted)),
+        }
+    }
+    assert_eq!(names(at), ["p.toml"]);
+}
+
 #[test]
 fn plans_and_folders_that_cannot_be_are_refused_and_nothing_is_written() {
     let temp = folder();

@@ -184,6 +184,19 @@ fn a_data_set_scores_as_the_reference_case() {
         "{text}"
     );
     assert!(text.contains("with other predictions before: 1"), "{text}");
+    // Only scores of test splits depend on how often these were scored before.
+    let words = [
+        "score",
+        "d",
+        "q.csv",
+        "--missing-is-none",
+        "--split",
+        "train",
+    ];
+    let out = wakescope(temp.path(), &words);
+    let text = String::from_utf8(out.stdout).unwrap();
+    assert!(text.contains("train: "), "{text}");
+    assert!(!text.contains("predictions before"), "{text}");
     let again = wakescope(temp.path(), &["score", "d", "d/p.csv", "--out", "s"]);
     assert_eq!(again.status.code(), Some(2));
 }
@@ -241,4 +254,15 @@ fn what_cannot_be_scored_is_refused_with_its_path_and_writes_nothing() {
         text.contains("d/scans.zarr: no flight of its split test_home is ready"),
         "{text}"
     );
+    // All flights of the reference case are ready, and a set that has no other split.
+    let only_train = folder.join("t");
+    data_set(&only_train, None);
+    let root = only_train.join("scans.zarr/split/c");
+    for chunk in fs::read_dir(&root).unwrap() {
+        let train = compressed(&[0; FLIGHTS_PER_CHUNK]);
+        fs::write(chunk.unwrap().path(), train).unwrap();
+    }
+    let text = score(&["t", "d/p.csv"]);
+    let wanted = "t/scans.zarr: it has no flight of the split test_home: --split train names those";
+    assert!(text.contains(wanted), "{text}");
 }

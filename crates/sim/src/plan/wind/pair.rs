@@ -2,7 +2,7 @@
 //!
 //! Check: a transported pair in uniform wind drifts with it, and the truth of its files is its decay.
 
-use super::{Retimed, circulation_profile, uniform_wind};
+use super::{Retimed, analytic_wind, circulation_profile, uniform_wind};
 use crate::Error;
 use crate::scene::{Flow, PairDecay, SceneFile, VortexMotion, VortexPair};
 use std::fmt::Write as _;
@@ -158,7 +158,8 @@ impl ScenePair {
     }
 }
 
-/// The mean winds of a scene, which carry a transported pair: uniform ones and profiles, and the cross wind of the pair, m/s.
+/// The mean winds of a scene: uniform ones, linear ones and profiles, and the cross wind of the pair, m/s. They carry a transported pair,
+/// beside which a linear one is refused.
 ///
 /// # Errors
 /// What a wind refuses; a checked scene gives none.
@@ -174,7 +175,7 @@ pub(crate) fn mean_winds(
                 lateral_m_s,
                 vertical_m_s,
             } => winds.push(Box::new(uniform_wind(*lateral_m_s, *vertical_m_s)?)),
-            Flow::Wind(wind) => winds.push(Box::new(wind.simulated()?)),
+            Flow::Wind(_) | Flow::Linear(_) => winds.push(analytic_wind(flow)?),
             _ => {}
         }
     }
