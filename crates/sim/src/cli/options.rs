@@ -105,8 +105,7 @@ pub(super) const ESTIMATOR_BESIDE_GATE_STD: &Idle = &[("estimator", GATE_STD)];
 const GATE_STD: &str = "--gate-std takes velocities for means with that weight";
 
 /// Of velocities that are means.
-pub(super) const OF_MEANS: &Idle = &[("window", NO_WINDOW), ("weighting", NO_WINDOW)];
-const NO_WINDOW: &str = "means over gates come from no window";
+pub(super) const OF_MEANS: &Idle = &[("weighting", "means over gates are not weighted")];
 
 /// Beside the scene that a file has in it.
 pub(super) const BESIDE_OWN_SCENE: &Idle = &[(

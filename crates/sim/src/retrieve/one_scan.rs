@@ -20,8 +20,9 @@ use wakescope_estimate::vortex_fit::{CorePrior, RangeKernel, Sharing, WakeModel}
 /// Standard deviation of the weight of gates that do not show cores, m.
 const LONG_GATE_M: f64 = 3.0;
 
-/// Points of the weight along the line, m.
+/// Distance of the points of the weight along the line, m, or points in a long gate.
 const SPACING_M: f64 = 1.25;
+const POINTS: f64 = 32.0;
 /// Root of 8 ln 2: width at half height of a Gaussian over its standard deviation.
 pub(crate) const WIDTH_OVER_STD: f64 = 2.354_820_045_030_949_4;
 
@@ -56,14 +57,12 @@ pub fn gate_of_instrument(
     scene: Option<&Scene>,
 ) -> Result<(Gate, Option<&'static str>), Error> {
     let pulse_m = pulse_width_s.map(|width_s| 0.5 * SPEED_OF_LIGHT_M_S * width_s / WIDTH_OVER_STD);
-    let window_m = gate_length_m.map(|length_m| length_m / 12f64.sqrt());
-    Ok(match (stated_m, scene, pulse_m, window_m) {
+    Ok(match (stated_m, scene, pulse_m, gate_length_m) {
         (Some(std_m), ..) => (of_std(std_m), None),
         (None, Some(scene), ..) => (of_scene(scene)?, None),
-        (None, None, Some(pulse_m), window_m) => {
-            (of_std(pulse_m.hypot(window_m.unwrap_or(0.0))), None)
-        }
-        (None, None, None, Some(window_m)) => (of_std(window_m), Some(WITHOUT_PULSE)),
+        (None, None, Some(pulse_m), None) => (of_std(pulse_m), None),
+        (None, None, Some(pulse_m), Some(length_m)) => (rectangle(pulse_m, length_m)?, None),
+        (None, None, None, Some(length_m)) => (rectangle(0.0, length_m)?, Some(WITHOUT_PULSE)),
         (None, None, None, None) => (Gate::Point, Some(AT_POINTS)),
     })
 }
@@ -74,6 +73,13 @@ fn of_std(std_m: f64) -> Gate {
     } else {
         Gate::Point
     }
+}
+
+/// A gate of that length behind a pulse.
+fn rectangle(pulse_std_m: f64, length_m: f64) -> Result<Gate, Error> {
+    let spacing_m = SPACING_M.max(length_m / POINTS);
+    let kernel = RangeKernel::rectangular_gate(pulse_std_m, length_m, spacing_m)?;
+    Ok(Gate::Kernel(kernel))
 }
 
 /// Pulse and window of a scene.
@@ -191,9 +197,9 @@ mod tests {
             fold_m_s: None,
         };
         let mut scan = ReadScan::new(Path::new(""), 0, map);
-        let std_m = |scan: &ReadScan, stated| match gate_of(Some(scan), stated, None).unwrap() {
-            (Gate::Gaussian { std_m }, told) => (std_m, told.is_some()),
-            (_, told) => (0.0, told.is_some()),
+        let std_m = |scan: &ReadScan, stated| {
+            let (gate, told) = gate_of(Some(scan), stated, None).unwrap();
+            (gate.std_m(), told.is_some())
         };
         assert_eq!(std_m(&scan, None), (0.0, true));
         assert_eq!(
@@ -201,7 +207,8 @@ mod tests {
             ((0.0, false), (14.4, false))
         );
         scan.gate_length_m = Some(30.0);
-        assert_eq!(std_m(&scan, None), (30.0 / 12f64.sqrt(), true));
+        let (of_rectangle_m, told) = std_m(&scan, None);
+        assert!((of_rectangle_m - 30.0 / 12f64.sqrt()).abs() < 0.01 && told);
         scan.pulse_width_s = Some(200e-9);
         // 200 ns at half height are 12.73 m of standard deviation.
         assert!((std_m(&scan, None).0 - 12.73f64.hypot(8.66)).abs() < 0.01);

@@ -5,8 +5,10 @@
 //! difference quotients.
 
 use multiversion::multiversion;
+use statrs::function::erf::erf;
+use std::f64::consts::SQRT_2;
 
-use crate::error::{Error, finite, positive};
+use crate::error::{Error, finite, not_negative, positive};
 use crate::linalg::dot;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::{PARAMETERS, Wake, WakeModel};
@@ -71,6 +73,29 @@ impl RangeKernel {
                 terms.sum()
             })
             .collect();
+        Self::new(-(reach as f64) * spacing_m, spacing_m, &weights)
+    }
+
+    /// The weights of a gate of that length \[m\], a rectangle, seen by a pulse whose power has that standard deviation in range \[m\], 0 if it is not
+    /// known; on a grid of `spacing_m` \[m\].
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a length or a spacing that is not positive, or a negative deviation.
+    pub fn rectangular_gate(pulse_std_m: f64, length_m: f64, spacing_m: f64) -> Result<Self, Error> {
+        not_negative("pulse_std_m", pulse_std_m)?;
+        positive("length_m", length_m)?;
+        positive("spacing_m", spacing_m)?;
+        // The ends of a rectangle alone are smooth on the scale of the grid.
+        let std_m = pulse_std_m.max(0.25 * spacing_m);
+        let reach = ((0.5 * length_m + 4.0 * std_m) / spacing_m).ceil() as i64;
+        let scale_m = SQRT_2 * std_m;
+        let mut weights = Vec::with_capacity(2 * reach as usize + 1);
+        for i in -reach..=reach {
+            let offset_m = i as f64 * spacing_m;
+            let far = erf((offset_m + 0.5 * length_m) / scale_m);
+            let near = erf((offset_m - 0.5 * length_m) / scale_m);
+            weights.push(far - near);
+        }
         Self::new(-(reach as f64) * spacing_m, spacing_m, &weights)
     }
 
