@@ -98,6 +98,13 @@ fn units_come_from_the_attribute_or_from_the_name() {
         let name = find(&table, &RANGE).unwrap();
         assert_eq!(values(&table, name, Quantity::Length), Ok(vec![400.0]));
     }
+    for header in ["range_ft", "range_feet", "Range [ft]"] {
+        let table = table(&format!("{header},elevation_mrad\n1000.0,100\n"));
+        let name = find(&table, &RANGE).expect(header);
+        assert_eq!(values(&table, name, Quantity::Length), Ok(vec![304.8]));
+        let (_, elevation_rad) = elevations_rad(&table).unwrap().expect(header);
+        assert_eq!(elevation_rad, [0.1]);
+    }
     let plain = table("elevation,b\n0.4,1\n");
     let refused = values(&plain, "elevation", Quantity::Angle).unwrap_err();
     assert!(refused.contains("elevation_deg"), "{refused}");
@@ -383,6 +390,9 @@ fn columns_are_found_in_any_spelling_of_their_names() {
         ("Radial velocity [cm/s]", 0.01),
         ("radialVelocity_m_s", 1.0),
         ("LOS-velocity (km/h)", 1.0 / 3.6),
+        ("velocity_knots", 1852.0 / 3600.0),
+        ("velocity_kts", 1852.0 / 3600.0),
+        ("velocity_kn", 1852.0 / 3600.0),
     ] {
         let table = table(&format!("{header}\n1.0\n2.0\n"));
         let name = find(&table, &VELOCITY).expect(header);

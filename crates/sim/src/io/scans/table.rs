@@ -5,7 +5,7 @@
 use super::grid::{mean_count, of_mean, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
 use super::{Found, ReadScan, ScanFormat, planes};
-use crate::io::csv_input::TextTable;
+use crate::io::csv_input::{TextTable, comma_remark};
 use crate::io::netcdf_input::quoted;
 use crate::io::units::Quantity;
 use crate::io::variable::{self, AZIMUTH, RANGE, RATIO, SIGMA, Times, VELOCITY, VariableNames};
@@ -261,8 +261,9 @@ impl<'t> Columns<'t> {
                 false => &cells[self.range],
             };
             return Err(format!(
-                "row {number}: its range or elevation is not a number: {}",
-                quoted(cell)
+                "row {number}: its range or elevation is not a number: {}{}",
+                quoted(cell),
+                comma_remark(cell)
             ));
         }
         if self.is_own {
@@ -270,9 +271,11 @@ impl<'t> Columns<'t> {
         }
         let velocity_m_s = self.rounded(self.velocity_m_s[row]);
         if velocity_m_s.is_nan() && !is_missing(&cells[self.velocity]) {
+            let cell = &cells[self.velocity];
             return Err(format!(
-                "row {number}: its velocity is not a number: {}; leave the cell of a missing one empty",
-                quoted(&cells[self.velocity])
+                "row {number}: its velocity is not a number: {}; leave the cell of a missing one empty{}",
+                quoted(cell),
+                comma_remark(cell)
             ));
         }
         let count = self.count.map(|column| self.table.number(row, column));
