@@ -182,7 +182,7 @@ pub(crate) const AZIMUTH: VariableNames = VariableNames {
     ],
 };
 pub(crate) const TIME: VariableNames = VariableNames {
-    names: "time timestamp datetime date_time time_utc utc_time unix_time",
+    names: "time timestamp datetime date_time time_utc utc_time unix_time decimal_time decimal_hours hours",
     standard_names: &["time"],
 };
 /// Nyquist velocities: half the interval after which velocities repeat.
@@ -252,12 +252,18 @@ fn is_column(column: &str, name: &str) -> bool {
         .eq(name.chars().filter(divides))
 }
 
-/// The unit of a variable: its attribute, or what its name ends with.
+/// Names of times that are hours where they state no unit.
+const HOURS: [&str; 3] = ["decimal_time", "decimal_hours", "hours"];
+
+/// The unit of a variable: its attribute, what its name ends with, or what its name says.
 fn units<'s>(source: &'s dyn VariableSource, name: &'s str) -> Option<&'s str> {
     let stated = source
         .attribute(name, "units")
         .filter(|units| !units.trim().is_empty());
-    stated.or_else(|| split_unit(name).1)
+    let are_hours = HOURS.iter().any(|hours| is_column(name, hours));
+    stated
+        .or_else(|| split_unit(name).1)
+        .or(are_hours.then_some("hours"))
 }
 
 /// The values of a variable in SI; NaN where one is missing.

@@ -281,6 +281,24 @@ fn times_of_a_day_go_on_after_midnight() {
 }
 
 #[test]
+fn decimal_hours_are_found_by_their_names_and_go_on_after_midnight() {
+    for header in [
+        "Decimal time (hours)",
+        "decimal_time_hours",
+        "decimal_time",
+        "Decimal hours",
+        "hours",
+        "time_h",
+    ] {
+        let table = table(&format!("{header},b\n23.9995,1\n0.0005,1\n"));
+        let found = times(&table, 2).unwrap();
+        assert_eq!(found.not_understood, None, "{header}");
+        let step_s = found.time_s[1] - found.time_s[0];
+        assert!((step_s - 3.6).abs() < 1e-6, "{header}: {found:?}");
+    }
+}
+
+#[test]
 fn times_of_32_bits_that_do_not_tell_rays_apart_are_named() {
     for (units, stored, step_s) in [
         ("seconds since 1970-01-01", 1.7e9, Some("128 s")),
