@@ -305,13 +305,19 @@ fn times_of_32_bits_that_do_not_tell_rays_apart_are_named() {
         ("days since 1970-01-01", 19_675.5, Some("169 s")),
         ("seconds since 2024-01-31", 60_000.0, None),
     ] {
-        let mut file = Given::numbers("time", &[("units", units)], &[stored; 2]);
+        let later = stored + 1.3;
+        let file = Given::numbers("time", &[("units", units)], &[stored, later]);
         assert_eq!(times(&file, 2).unwrap().rounded, None);
-        file.is_single = true;
-        let rounded = times(&file, 2).unwrap().rounded;
-        match step_s {
-            Some(step_s) => assert!(rounded.is_some_and(|text| text.contains(step_s)), "{units}"),
-            None => assert_eq!(rounded, None),
+        // Numbers of 64 bits that had 32 bits before are rounded as much.
+        for is_single in [true, false] {
+            let rounded = [stored, f64::from(later as f32)];
+            let mut file = Given::numbers("time", &[("units", units)], &rounded);
+            file.is_single = is_single;
+            let said = times(&file, 2).unwrap().rounded;
+            match step_s {
+                Some(step_s) => assert!(said.is_some_and(|text| text.contains(step_s)), "{units}"),
+                None => assert_eq!(said, None),
+            }
         }
     }
 }

@@ -4,7 +4,7 @@
 
 use super::grid::{mean_count, of_mean, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
-use super::{Found, ReadScan, ScanFormat, planes};
+use super::{Found, ReadScan, ScanFormat, WITHOUT_TIMES, planes};
 use crate::io::UtcTime;
 use crate::io::csv_input::{TextTable, comma_remark};
 use crate::io::netcdf_input::quoted;
@@ -79,6 +79,13 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
         }
     }
     found.warnings.extend(columns.times.not_understood);
+    if let Some(text) = columns.times.rounded {
+        // Before, they may have told scans apart.
+        for scan in &mut found.scans {
+            scan.map.time_s.fill(f64::NAN);
+        }
+        found.warnings.push(format!("{text}; {WITHOUT_TIMES}"));
+    }
     Ok(found)
 }
 
@@ -138,7 +145,9 @@ pub(super) fn rays_of_text(
         return Err("it has a header and no rows with an elevation".into());
     }
     let sweeps = sweeps.into_values().collect();
-    Ok((sweeps, columns.times.not_understood.into_iter().collect()))
+    let times = columns.times;
+    let warnings = times.not_understood.into_iter().chain(times.rounded);
+    Ok((sweeps, warnings.collect()))
 }
 
 /// Whether this program wrote a table. Programs that write it again keep the names of its columns.
@@ -299,7 +308,9 @@ impl<'t> Columns<'t> {
             Ok((rays, range_m)) => (planes::in_time_or_any_order(rays), range_m),
             // The same directions again, at other times: these alone tell the scans apart.
             Err(_) if have_times => {
-                let (rays, range_m) = grid(velocities, true)?;
+                let remark = self.times.rounded.as_deref();
+                let remark = remark.map_or(String::new(), |text| format!("; {text}"));
+                let (rays, range_m) = grid(velocities, true).map_err(|reason| reason + &remark)?;
                 (planes::in_time(rays), range_m)
             }
             Err(reason) => return Err(reason + &self.time_remark()),
@@ -521,6 +532,25 @@ mod tests {
         assert_eq!(found.scans.len(), 2);
         let first_s = [0, 1].map(|scan| found.scans[scan].map.time_s[0]);
         assert_eq!(first_s[1] - first_s[0], 60.0);
+    }
+
+    #[test]
+    fn times_that_had_32_bits_tell_scans_apart_and_are_unknown() {
+        let found = two_scans("time_s", ["1706702464", "1706702592"]);
+        let found = found.unwrap_or_else(|reason| panic!("{reason}"));
+        assert_eq!(found.scans.len(), 2);
+        let mut times = found.scans.iter().flat_map(|scan| &scan.map.time_s);
+        assert!(times.all(|time_s| time_s.is_nan()));
+        let said = &found.warnings[0];
+        assert!(said.contains("differ by 128 s or not at all"), "{said}");
+        let refused = two_scans("time_s", ["1706702464", "1706702464"]);
+        let refused = refused.err().expect("equal times");
+        assert!(
+            refused.contains("is there twice") && refused.contains("128 s"),
+            "{refused}"
+        );
+        let exact = two_scans("time_s", ["1706702465", "1706702593"]);
+        assert!(exact.is_ok_and(|found| found.warnings.is_empty()));
     }
 
     #[test]
