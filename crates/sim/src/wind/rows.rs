@@ -29,6 +29,8 @@ crate::keys::choice! {
         FewCells = "few_cells",
         /// The wind across the beam is not known; 5 m/s are assumed for the standard deviations.
         WindAssumed = "wind_assumed",
+        /// The wind across the plane of a scan in elevation is not known: it is taken as 0, by which the dissipation may be too high.
+        CrossWindUnknown = "cross_wind_unknown",
         /// The dissipation is less than two standard deviations.
         EdrBelowNoise = "edr_below_noise",
         /// The outer scale is at an end of those that are tried.
@@ -137,9 +139,12 @@ pub(super) fn row(
     if found.has_few_cells {
         row.flags.push(Flag::FewCells);
     }
-    let is_stare = matches!(components.kind, Kind::Up | Kind::Radial);
-    if is_stare && options.cross_winds.is_empty() {
-        row.flags.push(Flag::WindAssumed);
+    if options.cross_winds.is_empty() {
+        row.flags.extend(match components.kind {
+            Kind::Full => None,
+            Kind::Plane => Some(Flag::CrossWindUnknown),
+            Kind::Up | Kind::Radial => Some(Flag::WindAssumed),
+        });
     }
     let in_turbulence = turbulence.wind_covariance(number, bin, found, &window.rays, options)?;
     match turbulence.of_height(number, bin.height_m, options.layer_m) {

@@ -119,6 +119,9 @@ pub fn summary(profiles: &WindProfiles) -> String {
     if count(Flag::WindAssumed) > 0 {
         text += "the wind across the beam is not known: 5 m/s are assumed for the standard errors; --wind E,N or --wind wind.csv gives it\n";
     }
+    if count(Flag::CrossWindUnknown) > 0 {
+        text += "the wind across the plane of the scan is not known: EDR is too high if it is strong; --wind E,N or --wind wind.csv gives it\n";
+    }
     if let Some(row) = profiles.rows.iter().find(|row| row.has_wind())
         && row.kind == super::Kind::Radial
     {

@@ -185,6 +185,23 @@ fn a_scan_in_elevation_shows_the_wind_in_its_plane() {
     // 3 m/s + 0.02 z along azimuth 90 degrees.
     let count = holds(&rows, "rhi", "along", |_, height_m| 3.0 + 0.02 * height_m);
     assert!(count >= 3);
+    // What carries the air across the plane is not known unless it is given.
+    let flag = "cross_wind_unknown";
+    assert!(
+        rows.iter().all(|row| row["flags"].contains(flag)),
+        "{rows:?}"
+    );
+    let (_, output) = run(&file("rhi"), "--gate-std 14.36");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        text.contains("across the plane") && text.contains("--wind E,N"),
+        "{text}"
+    );
+    let given = winds(&file("rhi"), "--gate-std 14.36 --wind 3,0");
+    assert!(
+        given.iter().all(|row| !row["flags"].contains(flag)),
+        "{given:?}"
+    );
 }
 
 #[test]
