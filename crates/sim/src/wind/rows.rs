@@ -41,6 +41,8 @@ crate::keys::choice! {
         Noise = "noise",
         /// The directions do not determine the wind.
         Undetermined = "undetermined",
+        /// The vertical wind would be beyond 30 m/s, as where velocities are folded.
+        VerticalImpossible = "vertical_impossible",
     }
 }
 
@@ -125,6 +127,11 @@ pub(super) fn row(
         BinWind::Noise { likelihood } => {
             row.likelihood = *likelihood;
             row.flags.push(Flag::Noise);
+            return Ok(row);
+        }
+        BinWind::Impossible { likelihood } => {
+            row.likelihood = *likelihood;
+            row.flags.push(Flag::VerticalImpossible);
             return Ok(row);
         }
         BinWind::Found(found) => found,
@@ -307,7 +314,8 @@ impl WindRow {
     /// Whether it has a wind.
     #[must_use]
     pub fn has_wind(&self) -> bool {
-        !self.flags.contains(&Flag::Noise) && !self.flags.contains(&Flag::Undetermined)
+        let without = [Flag::Noise, Flag::Undetermined, Flag::VerticalImpossible];
+        !self.flags.iter().any(|flag| without.contains(flag))
     }
 
     /// Dissipation rate, m²/s³.

@@ -380,6 +380,33 @@ fn odd_input_gives_what_it_determines() {
 }
 
 #[test]
+fn a_vertical_wind_that_no_air_has_is_no_answer() {
+    let temp = tempfile::tempdir().unwrap();
+    let at = |up_m_s: f64| {
+        csv(temp.path(), "up.csv", 96, |_, cells| {
+            cells[4] += up_m_s * 60f64.to_radians().sin();
+        })
+    };
+    let rows = winds(&at(20.0), "");
+    assert!(
+        rows.iter()
+            .all(|row| (number(row, "up_m_s") - 20.0).abs() < 1.0)
+    );
+    for up_m_s in [60.0, -60.0] {
+        let data = at(up_m_s);
+        let rows = winds(&data, "");
+        for row in &rows {
+            let has_none = row["flags"] == "vertical_impossible" && row["up_m_s"].is_empty();
+            assert!(has_none && row["east_m_s"].is_empty(), "{row:?}");
+        }
+        let (_, output) = run(&data, "");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(text.contains("0 of 4 heights have a wind"), "{text}");
+        assert!(text.contains("4 have no wind since it would"), "{text}");
+    }
+}
+
+#[test]
 fn lidars_at_two_places_are_not_one() {
     let temp = tempfile::tempdir().unwrap();
     let mut bytes = std::fs::read(reference().join("vad_uniform.nc")).unwrap();
