@@ -35,8 +35,8 @@ impl UtcTime {
     }
 
     /// Reads a date as files write it, from which times count: `2024-01-31 12:00:0.5 +02:00`, `2024-1-31`, `20240131T120000Z`,
-    /// `2024-01-31_12:00:00`, `31.01.2024 12:00:00`, without a zone for UTC. Returns the second, and the fraction of a second beyond it; `None` for any
-    /// other text.
+    /// `2024-01-31_12:00:00`, `31.01.2024 12:00:00`, without a zone for UTC. Returns the second, and the fraction of a second
+    /// beyond it; `None` for any other text.
     ///
     /// ```
     /// use wakescope_sim::io::UtcTime;

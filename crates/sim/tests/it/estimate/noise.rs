@@ -261,7 +261,15 @@ fn counts_stored_as_floats_are_those_of_integers_and_missing_samples_are_counted
         fs::write(folder.join(name), bytes).unwrap();
         let folder_of = format!("of_{name}");
         let words = [
-            "estimate", name, "--scene", "s.toml", "--format", kind, "--out", &folder_of, "--quiet",
+            "estimate",
+            name,
+            "--scene",
+            "s.toml",
+            "--format",
+            kind,
+            "--out",
+            folder_of.as_str(),
+            "--quiet",
         ];
         let out = wakescope(folder, &words);
         assert!(out.status.success(), "{out:?}");
