@@ -68,6 +68,17 @@ impl SampleSizes {
         limit
     }
 
+    /// Number of samples of the size `limit` of [`SampleSizes::outsized`] and above.
+    #[must_use]
+    pub fn count_from(&self, limit: f64) -> usize {
+        if !limit.is_finite() {
+            return 0;
+        }
+        // The limit is the least size of its binary order.
+        let order = (limit.to_bits() >> 52) as usize;
+        self.counts.iter().skip(order).sum()
+    }
+
     /// The largest sample below `limit`; 0 if there is none.
     #[must_use]
     pub fn largest_below(&self, limit: f64) -> f64 {
@@ -193,6 +204,16 @@ mod tests {
             measured(&[1e-6, 1e300, 1e30, 3e-6, 1e-6, 2e-6, 1e6]),
             [true, false, false, true, true, true, false]
         );
+    }
+
+    #[test]
+    fn samples_that_are_taken_for_missing_are_counted() {
+        let mut sizes = SampleSizes::default();
+        for size in [1e-6, 3e-6, 0.0, 1e-6, 2e-6, 1e20, 3e20, f64::INFINITY] {
+            sizes.add(size);
+        }
+        assert_eq!(sizes.count_from(sizes.outsized()), 2);
+        assert_eq!(SampleSizes::default().count_from(f64::INFINITY), 0);
     }
 
     #[test]

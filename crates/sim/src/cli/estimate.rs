@@ -2,7 +2,7 @@
 
 use super::Cli;
 use super::args::{FolderArgs, noise, positive};
-use super::options::IN_MEMORY;
+use super::options::{IN_MEMORY, OF_RECORDED_SIGNALS};
 use crate::Error;
 use crate::io::raw::RawFormat;
 use crate::measure::recorded::{self, NoiseLevel, RayTable, Recorded, RecordedOptions};
@@ -55,6 +55,9 @@ pub(super) fn estimate(args: &EstimateArgs, cli: &Cli) -> Result<(), Error> {
     let rays = args.rays.as_deref().map(RayTable::read).transpose()?;
     let observer = cli.observer();
     let (scene, is_own) = recorded::scene_of_records(scene, &records, &*observer)?;
+    if !is_own {
+        cli.refuse_idle(&args.data, OF_RECORDED_SIGNALS)?;
+    }
     let plan = Plan::new(scene, Target::Map)?;
     args.folder
         .prepare_names(cli, &write::recorded_names(&plan)?)?;

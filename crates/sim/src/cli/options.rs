@@ -58,6 +58,12 @@ const NO_FILE: &str = "no file of scans is read";
 pub(super) const WITHOUT_SCENE: &Idle =
     &[("seed", "it replaces that of a scene: --scene states one")];
 
+/// Of estimates of signals that are not those of the scene's own simulation.
+pub(super) const OF_RECORDED_SIGNALS: &Idle = &[(
+    "seed",
+    "nothing in the estimates of recorded signals is random",
+)];
+
 /// Of winds, in which nothing is random.
 pub(super) const OF_WINDS: &Idle = &[("seed", "nothing in a wind is random")];
 

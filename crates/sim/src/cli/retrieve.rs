@@ -358,7 +358,13 @@ fn of_inputs(
         for scan in scans.maps {
             let start = prediction(&found.scans, &scan);
             match of_map(args, scene.as_ref(), scan, start, observer) {
-                Ok(one) => found.scans.push(one),
+                Ok(one) => {
+                    let mut before = found.scans.iter();
+                    if before.all(|scan| !scan.result.has(Flag::OneVortex)) {
+                        warn_of_sign(args, scene.as_ref(), &one, observer);
+                    }
+                    found.scans.push(one);
+                }
                 Err(error) if count > 1 && is_of_the_file(&error) => {
                     observer.warn(&format!("{error}: skipped"));
                     refused = refused.or(Some(error));
@@ -500,6 +506,43 @@ fn of_map(
         observer.warn(&format!("{}: {remark}", found.scan.path.display()));
     }
     Ok(found)
+}
+
+/// Drop in chi-square of velocities with the other sign over that of the velocities from which on these have the wrong sign.
+const OTHER_SIGN: f64 = 4.0;
+
+/// Warns of the sign of the velocities of a file where it makes one vortex of a pair: with images below the ground a pair of the other
+/// sense explains little of it.
+fn warn_of_sign(
+    args: &RetrieveArgs,
+    scene: Option<&SceneFile>,
+    found: &RetrievedScan,
+    observer: &dyn Observer,
+) {
+    let scan = &found.scan;
+    let is_own = scan.is_own || scan.scene_toml.is_some();
+    if is_own || args.method != Method::Fit || !found.result.has(Flag::OneVortex) {
+        return;
+    }
+    let mut negated = scan.clone();
+    negated.map.velocity_m_s.mapv_inplace(|v| -v);
+    let Ok(other) = of_map(args, scene, negated, None, &Silent) else {
+        return;
+    };
+    let is_pair = other.result.vortices.len() == 2 && !other.result.has(Flag::NoWake);
+    let is_far_better = other.result.statistic >= OTHER_SIGN * found.result.statistic;
+    if !(is_pair && is_far_better) {
+        return;
+    }
+    let cure = match args.scans.velocities.towards {
+        true => "are they positive away from the lidar? Then omit --towards",
+        false => "are they positive towards the lidar? Then give --towards",
+    };
+    let path = scan.path.display();
+    observer.warn(&format!(
+        "{path}: sweep {}: its velocities make one vortex, with the other sign a pair (chi-square falls by {:.0} instead of {:.0}): {cure}",
+        scan.sweep, other.result.statistic, found.result.statistic
+    ));
 }
 
 /// Why the best fit of a scan is no wake, in words.

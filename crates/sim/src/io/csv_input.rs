@@ -1,8 +1,8 @@
 //! Tables of texts from CSV: comment lines begin with `#`, `%`, `!` or `//`, the first other line is the header; quotes as in RFC 4180.
 //!
 //! Tables of other programs may have a header that is the last comment before a first line of numbers (`numpy.savetxt`), cells
-//! with semicolons, tabs, bars or blanks between them, decimal commas beside separators that are none, blanks around cells, the header
-//! again where files were joined, a row of units below it, and empty cells behind the last column.
+//! with semicolons, tabs, bars or blanks between them, decimal commas beside separators that are none or in quotes, blanks around cells,
+//! the header again where files were joined, a row of units below it, and empty cells behind the last column.
 //! Check: what the writer of tables makes of any text comes back; one table in each of these forms.
 
 use super::netcdf_input::quoted;
@@ -73,6 +73,7 @@ impl TextTable {
             }
             rows.push(row);
         }
+        let has_decimal_commas = separator != ',' || has_quoted_decimals(&rows);
         let mut comment = String::new();
         for line in text.lines().map_while(comment_of) {
             comment += line.trim_end();
@@ -82,7 +83,7 @@ impl TextTable {
             header,
             rows,
             comment,
-            has_decimal_commas: separator != ',',
+            has_decimal_commas,
         })
     }
 
@@ -132,6 +133,43 @@ impl TextTable {
         };
         number.unwrap_or(f64::NAN)
     }
+}
+
+/// Why a cell with a comma is no number, as the end of a message; nothing for other cells.
+pub(super) fn comma_remark(cell: &str) -> &'static str {
+    match cell.contains(',') {
+        true => {
+            "; a comma is a decimal point only where no number of the table has a point, and some have other than three digits behind it"
+        }
+        false => "",
+    }
+}
+
+/// Whether commas within cells, which are quoted between commas, are decimal points: each number with one is like `12,5`, none has
+/// a point, and some show that the comma does not divide thousands.
+fn has_quoted_decimals(rows: &[Vec<String>]) -> bool {
+    let mut is_sure = false;
+    for cell in rows.iter().flatten() {
+        let cell = cell.trim();
+        let Some((whole, fraction)) = cell.split_once(',') else {
+            if cell.contains('.') && cell.parse::<f64>().is_ok() {
+                return false;
+            }
+            continue;
+        };
+        let is_decimal = cell.replacen(',', ".", 1).parse::<f64>().is_ok();
+        if !is_decimal && cell.replace(',', "").parse::<f64>().is_ok() {
+            return false;
+        }
+        let before = whole.trim_start_matches(['+', '-']);
+        let is_whole = fraction.bytes().all(|b| b.is_ascii_digit());
+        let is_thousands = is_whole
+            && fraction.len() == 3
+            && (1..4).contains(&before.len())
+            && !before.starts_with('0');
+        is_sure |= is_decimal && !is_thousands;
+    }
+    is_sure
 }
 
 /// What is said of a row with another number of cells than the header.
@@ -302,6 +340,27 @@ mod tests {
             let read = table.number(row, table.column("x_m").unwrap());
             assert!(read.to_bits() == number.to_bits() || (read.is_nan() && number.is_nan()));
         }
+    }
+
+    #[test]
+    fn quoted_commas_are_decimal_points_where_all_numbers_have_that_form() {
+        fn numbers(rows: &str) -> [f64; 2] {
+            let table = TextTable::parse(&format!("a,b,name\n{rows}")).unwrap();
+            [0, 1].map(|column| table.number(0, column))
+        }
+        assert_eq!(numbers("\"12,5\",\"-0,125\",x\n"), [12.5, -0.125]);
+        assert_eq!(numbers("\"1,5e3\",7,\"x,y\"\n"), [1500.0, 7.0]);
+        assert_eq!(numbers("\"308,000\",\"0,125\",\"1. x\"\n"), [308.0, 0.125]);
+        for rows in [
+            "\"1,234.5\",\"12,5\",x\n",
+            "\"1,234,567\",\"12,5\",x\n",
+            "\"12,5\",\"1,25\",1.5\n",
+            "\"1,234\",\"12,500\",x\n",
+        ] {
+            assert!(numbers(rows).iter().all(|number| number.is_nan()), "{rows}");
+        }
+        assert_eq!(comma_remark("12.x"), "");
+        assert!(comma_remark("1,234").contains("three digits"));
     }
 
     #[test]

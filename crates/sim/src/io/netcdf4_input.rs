@@ -179,7 +179,7 @@ pub(crate) mod made {
 #[cfg(test)]
 mod tests {
     use super::made::{array, empty_group, file, object};
-    use crate::io::netcdf_input::{NetcdfFile, open};
+    use crate::io::netcdf_input::{NetcdfFile, open, open_groups};
 
     fn opened(bytes: &[u8]) -> Result<NetcdfFile, String> {
         let file = tempfile::NamedTempFile::new().unwrap();
@@ -206,6 +206,27 @@ mod tests {
             .collect();
         deep.push(empty_group());
         assert!(refused(&file(&deep)).contains("more than 32 deep"));
+    }
+
+    #[test]
+    fn files_of_weather_radars_are_named_with_what_can_be_done() {
+        // An attribute: sizes of its name, type and space, then these in whole words, then its text.
+        let text = b"ODIM_H5/V2_2";
+        let sizes = [1, 0, 12, 0, 8, 0, 8, 0];
+        let of_type = [0x13, 0, 0, 0, 12, 0, 0, 0];
+        let of_space = [1, 0, 0, 0, 0, 0, 0, 0];
+        let name = b"Conventions\0\0\0\0\0";
+        let attribute = [&sizes[..], name, &of_type, &of_space, text].concat();
+        let root = |at: u64| object(&[("g", at)], &[(12, attribute.clone())]);
+        let group = 96 + root(0).len() as u64;
+        let radar = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(radar.path(), file(&[root(group), empty_group()])).unwrap();
+        let refused = open_groups(radar.path(), "elevation", |file| file.has("elevation"));
+        let said = refused.map(|_| ()).unwrap_err().to_string();
+        assert!(
+            said.contains("ODIM_H5") && said.contains("CfRadial"),
+            "{said}"
+        );
     }
 
     #[test]

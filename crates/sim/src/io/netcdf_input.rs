@@ -36,6 +36,10 @@ const UNSOUND_HDF5: &str = "it is NetCDF-4 (HDF5), but damaged or of a kind that
 /// How NetCDF-4 becomes classic.
 const CONVERT: &str = "nccopy -k nc6 in.nc out.nc, or in xarray load_dataset(\"in.nc\").to_netcdf(\"out.nc\", format=\"NETCDF3_64BIT\")";
 
+/// What is said of files of weather radars in another layout of HDF5.
+const ODIM: &str = "it is an ODIM_H5 file, which is not read: export it to CfRadial, e.g. in Python with \
+                    pyart.io.write_cfradial(\"out.nc\", pyart.aux_io.read_odim_h5(\"in.h5\"))";
+
 /// What netCDF-4 puts before the name of a variable that is also that of a dimension along which it does not run.
 const NON_COORDINATE: &str = "_nc4_non_coord_";
 
@@ -186,9 +190,12 @@ pub(crate) fn open_groups(
         }
     }
     if found.is_empty() {
-        return Err(root.refuse(format!(
-            "neither it nor one of its groups has a variable {needed}"
-        )));
+        let conventions = root.global_text("Conventions").unwrap_or_default();
+        let reason = match conventions.starts_with("ODIM_H5") {
+            true => ODIM.to_owned(),
+            false => format!("neither it nor one of its groups has a variable {needed}"),
+        };
+        return Err(root.refuse(reason));
     }
     Ok(found)
 }

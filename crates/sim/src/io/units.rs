@@ -63,13 +63,19 @@ pub(crate) fn is_unit(text: &str) -> bool {
 }
 
 /// Units behind the names of columns, the longer ones first.
-const UNITS_OF_NAMES: [(&str, &str); 19] = [
+const UNITS_OF_NAMES: [(&str, &str); 25] = [
     ("_cm_s", "cm s-1"),
     ("_km_h", "km h-1"),
     ("_m_s", "m s-1"),
+    ("_knots", "knots"),
+    ("_kts", "kts"),
+    ("_kn", "kn"),
     ("_degrees", "degrees"),
     ("_deg", "degrees"),
+    ("_mrad", "mrad"),
     ("_rad", "rad"),
+    ("_feet", "feet"),
+    ("_ft", "ft"),
     ("_seconds", "s"),
     ("_hours", "hours"),
     ("_days", "days"),

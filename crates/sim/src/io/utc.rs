@@ -35,8 +35,8 @@ impl UtcTime {
     }
 
     /// Reads a date as files write it, from which times count: `2024-01-31 12:00:0.5 +02:00`, `2024-1-31`, `20240131T120000Z`,
-    /// `2024-01-31_12:00:00`, without a zone for UTC. Returns the second, and the fraction of a second beyond it; `None` for any
-    /// other text.
+    /// `2024-01-31_12:00:00`, `31.01.2024 12:00:00`, without a zone for UTC. Returns the second, and the fraction of a second
+    /// beyond it; `None` for any other text.
     ///
     /// ```
     /// use wakescope_sim::io::UtcTime;
@@ -89,11 +89,17 @@ impl UtcTime {
     }
 }
 
-/// Year, month and day of `2024-1-31` or `20240131`.
+/// Year, month and day of `2024-1-31`, `20240131` or `31.01.2024`, the day first where dots divide.
 fn calendar_date(text: &str) -> Option<jiff::civil::Date> {
     let numbers: Vec<&str> = match text.as_bytes() {
         [b'0'..=b'9', ..] if text.len() == 8 && text.bytes().all(|b| b.is_ascii_digit()) => {
             vec![&text[..4], &text[4..6], &text[6..]]
+        }
+        _ if text.contains('.') => {
+            let (day_and_month, year) =
+                text.rsplit_once('.').filter(|(_, year)| year.len() == 4)?;
+            let (day, month) = day_and_month.split_once('.')?;
+            vec![year, month, day]
         }
         _ => text.split(['-', '/']).collect(),
     };
@@ -216,6 +222,8 @@ mod tests {
             "2024-01-31 12:01:00 0:00",
             "20240131T120100Z",
             "2024-01-31_12:01:00",
+            "31.01.2024 12:01:00.000",
+            "31.1.2024 12:01",
             "2024/01/31 12:01:00.000 GMT",
             " 2024-02-01 00:01:00 +12:00 ",
         ] {
@@ -243,6 +251,11 @@ mod tests {
             "2024-01-31 25:00:00",
             "2024-02-30",
             "31-01-2024",
+            "01/31/2024 12:00:00",
+            "01.31.2024 12:00:00",
+            "31.01.24 12:00:00",
+            "2024.01.31.2024",
+            "2024-01-31 11:00:00 PM",
             "2024-01-31 12:00:00 CET",
             "2024-01-31 12.5",
             "2024-01-31T12:00:00+99:00",

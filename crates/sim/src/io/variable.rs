@@ -182,7 +182,7 @@ pub(crate) const AZIMUTH: VariableNames = VariableNames {
     ],
 };
 pub(crate) const TIME: VariableNames = VariableNames {
-    names: "time timestamp datetime date_time time_utc utc_time unix_time",
+    names: "time timestamp datetime date_time time_utc utc_time unix_time decimal_time decimal_hours hours",
     standard_names: &["time"],
 };
 /// Nyquist velocities: half the interval after which velocities repeat.
@@ -252,12 +252,18 @@ fn is_column(column: &str, name: &str) -> bool {
         .eq(name.chars().filter(divides))
 }
 
-/// The unit of a variable: its attribute, or what its name ends with.
+/// Names of times that are hours where they state no unit.
+const HOURS: [&str; 3] = ["decimal_time", "decimal_hours", "hours"];
+
+/// The unit of a variable: its attribute, what its name ends with, or what its name says.
 fn units<'s>(source: &'s dyn VariableSource, name: &'s str) -> Option<&'s str> {
     let stated = source
         .attribute(name, "units")
         .filter(|units| !units.trim().is_empty());
-    stated.or_else(|| split_unit(name).1)
+    let are_hours = HOURS.iter().any(|hours| is_column(name, hours));
+    stated
+        .or_else(|| split_unit(name).1)
+        .or(are_hours.then_some("hours"))
 }
 
 /// The values of a variable in SI; NaN where one is missing.
@@ -651,7 +657,8 @@ fn times_of_numbers(source: &dyn VariableSource, name: &str) -> Result<Times, St
         let why = not_understood(name, said.trim());
         return Ok(Times::unknown(numbers.len(), Some(why)));
     };
-    let rounded = match source.is_single(name) && numbers.len() > 1 {
+    let are_rounded = source.is_single(name) || have_32_bits(&numbers);
+    let rounded = match are_rounded && numbers.len() > 1 {
         true => rounding(name, &numbers, unit_s),
         false => None,
     };
@@ -705,6 +712,12 @@ fn plain_unit_s(numbers: &[f64]) -> f64 {
     1.0
 }
 
+/// Whether all numbers have no more digits than 32 bits hold, as those of a program that stored them so before.
+fn have_32_bits(numbers: &[f64]) -> bool {
+    let mut known = numbers.iter().filter(|number| number.is_finite());
+    known.all(|number| f64::from(*number as f32) == *number)
+}
+
 /// That numbers of 32 bits in units of `unit_s` are rounded too far, in words.
 fn rounding(name: &str, numbers: &[f64], unit_s: f64) -> Option<String> {
     let finite = numbers.iter().filter(|number| number.is_finite());
@@ -712,7 +725,7 @@ fn rounding(name: &str, numbers: &[f64], unit_s: f64) -> Option<String> {
     let step_s = f64::from(largest.next_up() - largest) * unit_s;
     (step_s > COARSE_S).then(|| {
         format!(
-            "its times have 32 bits and differ by {step_s:.0} s or not at all ({name}): store them as 64-bit numbers"
+            "its times are rounded to 32 bits and differ by {step_s:.0} s or not at all ({name}): store them as 64-bit numbers"
         )
     })
 }

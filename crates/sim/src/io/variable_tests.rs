@@ -98,6 +98,13 @@ fn units_come_from_the_attribute_or_from_the_name() {
         let name = find(&table, &RANGE).unwrap();
         assert_eq!(values(&table, name, Quantity::Length), Ok(vec![400.0]));
     }
+    for header in ["range_ft", "range_feet", "Range [ft]"] {
+        let table = table(&format!("{header},elevation_mrad\n1000.0,100\n"));
+        let name = find(&table, &RANGE).expect(header);
+        assert_eq!(values(&table, name, Quantity::Length), Ok(vec![304.8]));
+        let (_, elevation_rad) = elevations_rad(&table).unwrap().expect(header);
+        assert_eq!(elevation_rad, [0.1]);
+    }
     let plain = table("elevation,b\n0.4,1\n");
     let refused = values(&plain, "elevation", Quantity::Angle).unwrap_err();
     assert!(refused.contains("elevation_deg"), "{refused}");
@@ -274,19 +281,43 @@ fn times_of_a_day_go_on_after_midnight() {
 }
 
 #[test]
+fn decimal_hours_are_found_by_their_names_and_go_on_after_midnight() {
+    for header in [
+        "Decimal time (hours)",
+        "decimal_time_hours",
+        "decimal_time",
+        "Decimal hours",
+        "hours",
+        "time_h",
+    ] {
+        let table = table(&format!("{header},b\n23.9995,1\n0.0005,1\n"));
+        let found = times(&table, 2).unwrap();
+        assert_eq!(found.not_understood, None, "{header}");
+        let step_s = found.time_s[1] - found.time_s[0];
+        assert!((step_s - 3.6).abs() < 1e-6, "{header}: {found:?}");
+    }
+}
+
+#[test]
 fn times_of_32_bits_that_do_not_tell_rays_apart_are_named() {
     for (units, stored, step_s) in [
         ("seconds since 1970-01-01", 1.7e9, Some("128 s")),
         ("days since 1970-01-01", 19_675.5, Some("169 s")),
         ("seconds since 2024-01-31", 60_000.0, None),
     ] {
-        let mut file = Given::numbers("time", &[("units", units)], &[stored; 2]);
+        let later = stored + 1.3;
+        let file = Given::numbers("time", &[("units", units)], &[stored, later]);
         assert_eq!(times(&file, 2).unwrap().rounded, None);
-        file.is_single = true;
-        let rounded = times(&file, 2).unwrap().rounded;
-        match step_s {
-            Some(step_s) => assert!(rounded.is_some_and(|text| text.contains(step_s)), "{units}"),
-            None => assert_eq!(rounded, None),
+        // Numbers of 64 bits that had 32 bits before are rounded as much.
+        for is_single in [true, false] {
+            let rounded = [stored, f64::from(later as f32)];
+            let mut file = Given::numbers("time", &[("units", units)], &rounded);
+            file.is_single = is_single;
+            let said = times(&file, 2).unwrap().rounded;
+            match step_s {
+                Some(step_s) => assert!(said.is_some_and(|text| text.contains(step_s)), "{units}"),
+                None => assert_eq!(said, None),
+            }
         }
     }
 }
@@ -383,6 +414,9 @@ fn columns_are_found_in_any_spelling_of_their_names() {
         ("Radial velocity [cm/s]", 0.01),
         ("radialVelocity_m_s", 1.0),
         ("LOS-velocity (km/h)", 1.0 / 3.6),
+        ("velocity_knots", 1852.0 / 3600.0),
+        ("velocity_kts", 1852.0 / 3600.0),
+        ("velocity_kn", 1852.0 / 3600.0),
     ] {
         let table = table(&format!("{header}\n1.0\n2.0\n"));
         let name = find(&table, &VELOCITY).expect(header);

@@ -38,7 +38,7 @@ pub(super) struct Components {
 
 const EAST: [f64; 3] = [1.0, 0.0, 0.0];
 const NORTH: [f64; 3] = [0.0, 1.0, 0.0];
-const UP: [f64; 3] = [0.0, 0.0, 1.0];
+pub(super) const UP: [f64; 3] = [0.0, 0.0, 1.0];
 
 /// Scalar product.
 pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

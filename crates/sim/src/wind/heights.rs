@@ -3,7 +3,7 @@
 //! Check: `wind` in the tests of the program.
 
 use super::WindOptions;
-use super::directions::{Components, dot};
+use super::directions::{Components, UP, dot};
 use crate::Error;
 use crate::io::scans::Ray;
 use ndarray::{Array2, s};
@@ -18,6 +18,12 @@ const LEAST_STEP_M: f64 = 0.05;
 const SAME_HEIGHT_M: f64 = 1e-3;
 /// Step of heights of scans of several elevations, m.
 const USUAL_STEP_M: f64 = 25.0;
+
+/// Largest vertical wind in the mean over a scan, m/s: updraughts of thunderstorms reach 50 m/s, and are narrower. Velocities that are
+/// folded together shift the vertical wind by the width of the band over the sine of the elevation.
+const MOST_UP_M_S: f64 = 30.0;
+/// Standard errors of noise by which a vertical wind must exceed that.
+const SURE: f64 = 3.0;
 
 /// Step of a sequence of low discrepancy: the golden ratio less 1.
 const GOLDEN: f64 = 0.618_033_988_7;
@@ -52,6 +58,8 @@ pub(super) enum BinWind {
     Undetermined,
     /// Its velocities are noise.
     Noise { likelihood: f64 },
+    /// Its vertical wind is none that air has.
+    Impossible { likelihood: f64 },
     /// A wind.
     Found(Box<FoundWind>),
 }
@@ -393,6 +401,11 @@ fn wind_of_bins(
             likelihood: fit.likelihood,
         });
     };
+    if is_impossible(axes, &fit, &gain) {
+        return Ok(BinWind::Impossible {
+            likelihood: fit.likelihood,
+        });
+    }
     fit.wind_m_s.truncate(count);
     Ok(BinWind::Found(Box::new(FoundWind {
         gain: gain.slice(s![..count, ..]).to_owned(),
@@ -403,6 +416,17 @@ fn wind_of_bins(
         used,
         first_own,
     })))
+}
+
+/// Whether the vertical wind among several components is beyond what air has, by more than its noise.
+fn is_impossible(axes: &[[f64; 3]], fit: &MixtureFit, gain: &Array2<f64>) -> bool {
+    let up = axes.iter().position(|axis| *axis == UP);
+    let Some(up) = up.filter(|_| axes.len() > 1) else {
+        return false;
+    };
+    let squares: f64 = gain.row(up).iter().map(|part| part * part).sum();
+    let noise_std_m_s = fit.std_m_s * squares.sqrt();
+    fit.wind_m_s[up].abs() > MOST_UP_M_S + SURE * noise_std_m_s
 }
 
 #[cfg(test)]

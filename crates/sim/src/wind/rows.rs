@@ -29,6 +29,8 @@ crate::keys::choice! {
         FewCells = "few_cells",
         /// The wind across the beam is not known; 5 m/s are assumed for the standard deviations.
         WindAssumed = "wind_assumed",
+        /// The wind across the plane of a scan in elevation is not known: it is taken as 0, by which the dissipation may be too high.
+        CrossWindUnknown = "cross_wind_unknown",
         /// The dissipation is less than two standard deviations.
         EdrBelowNoise = "edr_below_noise",
         /// The outer scale is at an end of those that are tried.
@@ -39,6 +41,8 @@ crate::keys::choice! {
         Noise = "noise",
         /// The directions do not determine the wind.
         Undetermined = "undetermined",
+        /// The vertical wind would be beyond 30 m/s, as where velocities are folded.
+        VerticalImpossible = "vertical_impossible",
     }
 }
 
@@ -125,6 +129,11 @@ pub(super) fn row(
             row.flags.push(Flag::Noise);
             return Ok(row);
         }
+        BinWind::Impossible { likelihood } => {
+            row.likelihood = *likelihood;
+            row.flags.push(Flag::VerticalImpossible);
+            return Ok(row);
+        }
         BinWind::Found(found) => found,
     };
     row.residual_std_m_s = found.fit.std_m_s;
@@ -137,9 +146,12 @@ pub(super) fn row(
     if found.has_few_cells {
         row.flags.push(Flag::FewCells);
     }
-    let is_stare = matches!(components.kind, Kind::Up | Kind::Radial);
-    if is_stare && options.cross_winds.is_empty() {
-        row.flags.push(Flag::WindAssumed);
+    if options.cross_winds.is_empty() {
+        row.flags.extend(match components.kind {
+            Kind::Full => None,
+            Kind::Plane => Some(Flag::CrossWindUnknown),
+            Kind::Up | Kind::Radial => Some(Flag::WindAssumed),
+        });
     }
     let in_turbulence = turbulence.wind_covariance(number, bin, found, &window.rays, options)?;
     match turbulence.of_height(number, bin.height_m, options.layer_m) {
@@ -302,7 +314,8 @@ impl WindRow {
     /// Whether it has a wind.
     #[must_use]
     pub fn has_wind(&self) -> bool {
-        !self.flags.contains(&Flag::Noise) && !self.flags.contains(&Flag::Undetermined)
+        let without = [Flag::Noise, Flag::Undetermined, Flag::VerticalImpossible];
+        !self.flags.iter().any(|flag| without.contains(flag))
     }
 
     /// Dissipation rate, m²/s³.

@@ -111,13 +111,22 @@ pub fn summary(profiles: &WindProfiles) -> String {
     let all = profiles.rows.len();
     let noise = count(Flag::Noise);
     let undetermined = count(Flag::Undetermined);
-    let found = all - noise - undetermined;
+    let impossible = count(Flag::VerticalImpossible);
+    let found = all - noise - undetermined - impossible;
     let mut text = profile(&profiles.rows);
     text += &format!(
         "{found} of {all} heights have a wind; {noise} are noise, the directions do not determine {undetermined}\n"
     );
+    if impossible > 0 {
+        text += &format!(
+            "{impossible} have no wind since it would have a vertical component beyond 30 m/s: velocities beyond the Nyquist velocity, or bad ones\n"
+        );
+    }
     if count(Flag::WindAssumed) > 0 {
         text += "the wind across the beam is not known: 5 m/s are assumed for the standard errors; --wind E,N or --wind wind.csv gives it\n";
+    }
+    if count(Flag::CrossWindUnknown) > 0 {
+        text += "the wind across the plane of the scan is not known: EDR is too high if it is strong; --wind E,N or --wind wind.csv gives it\n";
     }
     if let Some(row) = profiles.rows.iter().find(|row| row.has_wind())
         && row.kind == super::Kind::Radial

@@ -127,6 +127,39 @@ fn a_scan_beyond_the_zenith_sees_the_wake_on_the_other_side() {
     }
 }
 
+#[test]
+fn velocities_of_the_other_sign_are_noticed() {
+    let temp = tempfile::tempdir().unwrap();
+    let map = fs::read_to_string(reference("estimate/map_a.csv")).unwrap();
+    let mut negated = String::new();
+    for line in map.lines() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Some(Ok(velocity_m_s)) = cells.get(3).map(|cell| cell.parse::<f64>()) {
+            cells[3] = (-velocity_m_s).to_string();
+        }
+        negated += &(cells.join(",") + "\n");
+    }
+    fs::write(temp.path().join("as_it_is.csv"), &map).unwrap();
+    fs::write(temp.path().join("negated.csv"), negated).unwrap();
+    for (words, cure) in [
+        ("as_it_is.csv", None),
+        ("negated.csv --towards", None),
+        ("negated.csv", Some("give --towards")),
+        ("as_it_is.csv --towards", Some("omit --towards")),
+    ] {
+        let mut all = vec!["retrieve"];
+        all.extend(words.split(' '));
+        all.extend(["--out", "r", "--quiet", "--overwrite"]);
+        let out = wakescope(temp.path(), &all);
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.success(), "{words}: {said}");
+        match cure {
+            Some(cure) => assert!(said.contains(cure), "{words}: {said}"),
+            None => assert!(!said.contains("other sign"), "{words}: {said}"),
+        }
+    }
+}
+
 /// The peaks of this scan, taken for means over gates, show one vortex alone.
 #[test]
 fn a_pair_of_which_peaks_show_one_vortex_is_found_by_what_the_estimator_shows() {

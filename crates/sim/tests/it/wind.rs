@@ -185,6 +185,23 @@ fn a_scan_in_elevation_shows_the_wind_in_its_plane() {
     // 3 m/s + 0.02 z along azimuth 90 degrees.
     let count = holds(&rows, "rhi", "along", |_, height_m| 3.0 + 0.02 * height_m);
     assert!(count >= 3);
+    // What carries the air across the plane is not known unless it is given.
+    let flag = "cross_wind_unknown";
+    assert!(
+        rows.iter().all(|row| row["flags"].contains(flag)),
+        "{rows:?}"
+    );
+    let (_, output) = run(&file("rhi"), "--gate-std 14.36");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        text.contains("across the plane") && text.contains("--wind E,N"),
+        "{text}"
+    );
+    let given = winds(&file("rhi"), "--gate-std 14.36 --wind 3,0");
+    assert!(
+        given.iter().all(|row| !row["flags"].contains(flag)),
+        "{given:?}"
+    );
 }
 
 #[test]
@@ -359,6 +376,33 @@ fn odd_input_gives_what_it_determines() {
             );
             assert!((number(a, "east_m_s") - 4.0).abs() < 0.3, "{a:?}");
         }
+    }
+}
+
+#[test]
+fn a_vertical_wind_that_no_air_has_is_no_answer() {
+    let temp = tempfile::tempdir().unwrap();
+    let at = |up_m_s: f64| {
+        csv(temp.path(), "up.csv", 96, |_, cells| {
+            cells[4] += up_m_s * 60f64.to_radians().sin();
+        })
+    };
+    let rows = winds(&at(20.0), "");
+    assert!(
+        rows.iter()
+            .all(|row| (number(row, "up_m_s") - 20.0).abs() < 1.0)
+    );
+    for up_m_s in [60.0, -60.0] {
+        let data = at(up_m_s);
+        let rows = winds(&data, "");
+        for row in &rows {
+            let has_none = row["flags"] == "vertical_impossible" && row["up_m_s"].is_empty();
+            assert!(has_none && row["east_m_s"].is_empty(), "{row:?}");
+        }
+        let (_, output) = run(&data, "");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(text.contains("0 of 4 heights have a wind"), "{text}");
+        assert!(text.contains("4 have no wind since it would"), "{text}");
     }
 }
 

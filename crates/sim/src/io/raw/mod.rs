@@ -26,7 +26,6 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use wakescope_estimate::window::FILL_VALUES;
 
 /// How the numbers of a file are stored, as far as the file does not say it.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -124,8 +123,6 @@ pub struct RawRecords {
     pub is_complex: bool,
     /// Whether the numbers are codes of a converter.
     pub are_integers: bool,
-    /// Values of missing numbers.
-    fills: Vec<f64>,
     /// The factor that the numbers of the source have had.
     packed_scale: f64,
     /// The order of the records in the file, and the pulses of a line for it.
@@ -217,12 +214,6 @@ impl RawRecords {
             samples,
             is_complex,
             are_integers,
-            // Of a converter's codes each may be a sample.
-            fills: if are_integers {
-                Vec::new()
-            } else {
-                FILL_VALUES.to_vec()
-            },
             packed_scale: 1.0,
             order: Order::default(),
             pulses_per_line: 1,
@@ -309,13 +300,12 @@ impl RawRecords {
         Ok(found)
     }
 
-    /// The value of a stored number; NaN for a missing one.
+    /// The value of a stored number.
+    ///
+    /// No number is taken for missing by its value: floats may be the counts of a converter, of
+    /// which -9999 is one. Fill values that a file declares arrive as NaN.
     fn scaled(&self, stored: f64, zero: f64) -> f64 {
-        if self.fills.contains(&stored) {
-            f64::NAN
-        } else {
-            (stored - zero) * self.scale
-        }
+        (stored - zero) * self.scale
     }
 
     /// Reverses the spectrum of consecutive samples of a record: the conjugate of complex samples;

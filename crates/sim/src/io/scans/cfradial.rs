@@ -7,7 +7,7 @@
 use super::gate_layout::GateLayout;
 use super::grid::{mean_count, of_mean, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
-use super::{Found, ReadScan, ScanFormat, planes};
+use super::{Found, ReadScan, ScanFormat, WITHOUT_TIMES, planes};
 use crate::io::netcdf_input::{NetcdfFile, quoted};
 use crate::io::units::Quantity;
 use crate::io::variable::{
@@ -42,8 +42,7 @@ pub(super) fn scans(
     turn_falling(&mut range_m, &mut rays.rows);
     if let Some(text) = rays.rounded {
         rays.rows.iter_mut().for_each(|row| row.time_s = f64::NAN);
-        let without = "its scans have no times and are in no track";
-        rays.warnings.push(format!("{text}; {without}"));
+        rays.warnings.push(format!("{text}; {WITHOUT_TIMES}"));
     }
     let pulse_width_s = pulse_width(file)?;
     let place_deg = place(file)?;

@@ -139,6 +139,9 @@ impl ReadScan {
 const NO_RATIO: &str = "it has no signal-to-noise ratio, which --min-snr needs: none of its variables is called snr, cnr, \
                         signal_to_noise_ratio or intensity";
 
+/// What follows from times that are rounded too far.
+const WITHOUT_TIMES: &str = "its scans have no times and are in no track";
+
 /// Brings the times of scans to the first date from which some of them count; those without a date have no times then, as nothing says
 /// how they lie to the others. Returns the files of these.
 pub fn share_origin(scans: &mut [&mut ReadScan]) -> Vec<PathBuf> {

@@ -4,8 +4,9 @@
 
 use super::grid::{mean_count, of_mean, scan_map};
 use super::rays::{FoundRays, Ray, RaySweep};
-use super::{Found, ReadScan, ScanFormat, planes};
-use crate::io::csv_input::TextTable;
+use super::{Found, ReadScan, ScanFormat, WITHOUT_TIMES, planes};
+use crate::io::UtcTime;
+use crate::io::csv_input::{TextTable, comma_remark};
 use crate::io::netcdf_input::quoted;
 use crate::io::units::Quantity;
 use crate::io::variable::{self, AZIMUTH, RANGE, RATIO, SIGMA, Times, VELOCITY, VariableNames};
@@ -60,18 +61,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
     }
     for (sweep, velocities) in sweeps {
         let what = format!("sweep {sweep}");
-        let (found_scans, range_m) = match grid(&velocities, false) {
-            // The same directions again, at other times: these alone tell the scans apart.
-            Err(_) if velocities.iter().all(|row| row.time_s.is_finite()) => {
-                let (rays, range_m) = grid(&velocities, true)?;
-                (planes::in_time(rays), range_m)
-            }
-            first => {
-                let (rays, range_m) = first?;
-                (planes::in_time_or_any_order(rays), range_m)
-            }
-        };
-        let (scans, skipped) = found_scans.map_err(|reason| format!("{what}: {reason}"))?;
+        let ((scans, skipped), range_m) = columns.split(&what, &velocities)?;
         let skipped = skipped.iter().map(|text| format!("{what}: {text}"));
         found.skipped.extend(skipped);
         for scan in scans {
@@ -89,6 +79,13 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
         }
     }
     found.warnings.extend(columns.times.not_understood);
+    if let Some(text) = columns.times.rounded {
+        // Before, they may have told scans apart.
+        for scan in &mut found.scans {
+            scan.map.time_s.fill(f64::NAN);
+        }
+        found.warnings.push(format!("{text}; {WITHOUT_TIMES}"));
+    }
     Ok(found)
 }
 
@@ -148,7 +145,9 @@ pub(super) fn rays_of_text(
         return Err("it has a header and no rows with an elevation".into());
     }
     let sweeps = sweeps.into_values().collect();
-    Ok((sweeps, columns.times.not_understood.into_iter().collect()))
+    let times = columns.times;
+    let warnings = times.not_understood.into_iter().chain(times.rounded);
+    Ok((sweeps, warnings.collect()))
 }
 
 /// Whether this program wrote a table. Programs that write it again keep the names of its columns.
@@ -261,8 +260,9 @@ impl<'t> Columns<'t> {
                 false => &cells[self.range],
             };
             return Err(format!(
-                "row {number}: its range or elevation is not a number: {}",
-                quoted(cell)
+                "row {number}: its range or elevation is not a number: {}{}",
+                quoted(cell),
+                comma_remark(cell)
             ));
         }
         if self.is_own {
@@ -270,9 +270,11 @@ impl<'t> Columns<'t> {
         }
         let velocity_m_s = self.rounded(self.velocity_m_s[row]);
         if velocity_m_s.is_nan() && !is_missing(&cells[self.velocity]) {
+            let cell = &cells[self.velocity];
             return Err(format!(
-                "row {number}: its velocity is not a number: {}; leave the cell of a missing one empty",
-                quoted(&cells[self.velocity])
+                "row {number}: its velocity is not a number: {}; leave the cell of a missing one empty{}",
+                quoted(cell),
+                comma_remark(cell)
             ));
         }
         let count = self.count.map(|column| self.table.number(row, column));
@@ -290,6 +292,61 @@ impl<'t> Columns<'t> {
             sigma_m_s: sigma_m_s.map(|all| of_mean(self.rounded(all[row]), count)),
             count: count.unwrap_or(f64::NAN),
         }))
+    }
+
+    /// The scans of the velocities of the sweep `what`, and the ranges of all, m.
+    ///
+    /// # Errors
+    /// Velocities that make no grid, with what is not understood of their times where these could tell scans apart; no scans.
+    fn split(
+        &self,
+        what: &str,
+        velocities: &[TableVelocity],
+    ) -> Result<(planes::Split, Vec<f64>), String> {
+        let have_times = velocities.iter().all(|row| row.time_s.is_finite());
+        let (split, range_m) = match grid(velocities, false) {
+            Ok((rays, range_m)) => (planes::in_time_or_any_order(rays), range_m),
+            // The same directions again, at other times: these alone tell the scans apart.
+            Err(_) if have_times => {
+                let remark = self.times.rounded.as_deref();
+                let remark = remark.map_or(String::new(), |text| format!("; {text}"));
+                let (rays, range_m) = grid(velocities, true).map_err(|reason| reason + &remark)?;
+                (planes::in_time(rays), range_m)
+            }
+            Err(reason) => return Err(reason + &self.time_remark()),
+        };
+        let split = split.map_err(|reason| format!("{what}: {reason}"))?;
+        Ok((split, range_m))
+    }
+
+    /// What is not understood of the times, as the end of a message: their texts, or a column that seems to hold them.
+    fn time_remark(&self) -> String {
+        let words = ["time", "hour", "day", "date", "clock"];
+        if let Some(text) = &self.times.not_understood {
+            return format!("; {text}");
+        }
+        if self.times.time_s.iter().any(|time_s| time_s.is_finite()) {
+            return String::new();
+        }
+        let mut columns = self.table.header.iter().enumerate();
+        let found = columns.find(|(_, name)| {
+            let lower = name.to_ascii_lowercase();
+            words.iter().any(|word| lower.contains(word))
+        });
+        let Some((column, name)) = found else {
+            return String::new();
+        };
+        let cell = self
+            .table
+            .rows
+            .first()
+            .map_or("", |row| row[column].as_str());
+        format!(
+            "; its column {} ({}) is not understood as a time: time_s, or time with dates such as {}, is needed",
+            quoted(name),
+            quoted(cell),
+            UtcTime::FORM
+        )
     }
 
     /// A number with the digits of this program's NetCDF files, in a table of this program.
@@ -445,5 +502,81 @@ fn nearest(axis: &[f64], value: f64) -> usize {
         near[0]
     } else {
         near[1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two scans of eight lines in seconds with a last column of times: the second of a line takes the place of `SS`.
+    fn two_scans(header: &str, times: [&str; 2]) -> Result<Found, String> {
+        let mut text = format!("range_m,elevation_deg,velocity_m_s,{header}\n");
+        for (scan, time) in times.into_iter().enumerate() {
+            for line in 0..8 {
+                let time = time.replace("SS", &format!("{:02}", 10 + line));
+                for gate in 0..8 {
+                    let velocity_m_s = 0.37 * (scan + 2 * line + gate * gate) as f64;
+                    let range_m = 100 + 10 * gate;
+                    text += &format!("{range_m},{},{velocity_m_s},{time}\n", 2 + line);
+                }
+            }
+        }
+        scans(&text, Path::new("a.csv"), &ScanFormat::default())
+    }
+
+    #[test]
+    fn times_of_a_german_date_tell_scans_apart() {
+        let times = ["31.01.2024 23:59:SS.0", "01.02.2024 00:00:SS.0"];
+        let found = two_scans("time", times).unwrap_or_else(|reason| panic!("{reason}"));
+        assert_eq!(found.scans.len(), 2);
+        let first_s = [0, 1].map(|scan| found.scans[scan].map.time_s[0]);
+        assert_eq!(first_s[1] - first_s[0], 60.0);
+    }
+
+    #[test]
+    fn times_that_had_32_bits_tell_scans_apart_and_are_unknown() {
+        let found = two_scans("time_s", ["1706702464", "1706702592"]);
+        let found = found.unwrap_or_else(|reason| panic!("{reason}"));
+        assert_eq!(found.scans.len(), 2);
+        let mut times = found.scans.iter().flat_map(|scan| &scan.map.time_s);
+        assert!(times.all(|time_s| time_s.is_nan()));
+        let said = &found.warnings[0];
+        assert!(said.contains("differ by 128 s or not at all"), "{said}");
+        let refused = two_scans("time_s", ["1706702464", "1706702464"]);
+        let refused = refused.err().expect("equal times");
+        assert!(
+            refused.contains("is there twice") && refused.contains("128 s"),
+            "{refused}"
+        );
+        let exact = two_scans("time_s", ["1706702465", "1706702593"]);
+        assert!(exact.is_ok_and(|found| found.warnings.is_empty()));
+    }
+
+    #[test]
+    fn scans_that_no_time_tells_apart_are_refused_with_the_times_that_are_not_understood() {
+        for (header, times, said) in [
+            (
+                "time",
+                ["11:59:SS PM", "12:00:SS AM"],
+                "not understood (time: \"11:59:10 PM\")",
+            ),
+            (
+                "Timestamp",
+                ["01/31/2024 23:59:SS", "02/01/2024 00:00:SS"],
+                "not understood (Timestamp: \"01/31/2024 23:59:10\")",
+            ),
+            (
+                "day_of_year",
+                ["31.99SS", "32.00SS"],
+                "its column \"day_of_year\" (\"31.9910\") is not understood as a time",
+            ),
+        ] {
+            let refused = two_scans(header, times).err().expect(header);
+            assert!(refused.contains("is there twice"), "{refused}");
+            assert!(refused.contains(said), "{refused}");
+        }
+        let refused = two_scans("quality", ["1", "1"]).err().expect("no times");
+        assert!(refused.ends_with("tells scans apart"), "{refused}");
     }
 }

@@ -370,6 +370,8 @@ struct Survey {
     means: Vec<Complex<f64>>,
     /// The sum of the samples at each place of a record, and their number.
     places: Vec<(Complex<f64>, f64)>,
+    /// Number of samples that are not finite.
+    not_finite: usize,
 }
 
 /// Surveys the samples of a file.
@@ -384,6 +386,7 @@ fn survey(records: &mut RawRecords) -> Result<Survey, Error> {
             let mut count = 0.0;
             for (sample, place) in record.iter().zip(&mut found.places) {
                 if !sample.is_finite() {
+                    found.not_finite += 1;
                     continue;
                 }
                 found.sizes.add(sample.largest_part());
@@ -431,6 +434,28 @@ fn constant_offset(means: &[Complex<f64>]) -> Option<Complex<f64>> {
     (mean.norm() > SURE * standard_error).then_some(mean)
 }
 
+/// The size from which on samples of some records are missing.
+fn outsized(records: &RawRecords, sizes: &SampleSizes) -> f64 {
+    match records.are_integers {
+        true => f64::INFINITY,
+        false => sizes.outsized(),
+    }
+}
+
+/// Warns of missing samples, which cost the windows that hold them.
+fn warn_of_missing(records: &RawRecords, found: &Survey, observer: &dyn Observer) {
+    let missing = found.not_finite + found.sizes.count_from(records.outsized);
+    if missing == 0 {
+        return;
+    }
+    let path = records.path.display();
+    let all = records.records * records.samples;
+    observer.warn(&format!(
+        "{path}: {missing} of {all} samples are missing (a declared fill value, not finite, or a million times larger than the others): \
+         windows that hold one are skipped"
+    ));
+}
+
 /// The largest part of all samples, the outsized ones left out from here on; refuses records without any, and codes that the
 /// scene's converter does not have. A constant offset of the samples of an instrument is subtracted from here on: echoes of the air have
 /// other phases in each record, and a hard target has some places of it.
@@ -440,18 +465,10 @@ fn largest_part(
     records: &mut RawRecords,
     observer: &dyn Observer,
 ) -> Result<f64, Error> {
-    let Survey {
-        sizes,
-        means,
-        places,
-    } = survey(records)?;
-    let outsized = |records: &RawRecords, sizes: &SampleSizes| match records.are_integers {
-        true => f64::INFINITY,
-        false => sizes.outsized(),
-    };
-    records.outsized = outsized(records, &sizes);
-    let largest = sizes.largest_below(records.outsized);
-    if means.is_empty() {
+    let found = survey(records)?;
+    records.outsized = outsized(records, &found.sizes);
+    let largest = found.sizes.largest_below(records.outsized);
+    if found.means.is_empty() {
         return Err(
             records.refuse("all of its samples are missing: none is a finite number".into())
         );
@@ -470,12 +487,24 @@ fn largest_part(
     }
     let offset = match is_own {
         true => None,
-        false => constant_offset(&means),
+        false => constant_offset(&found.means),
     };
-    let offset = offset.filter(|mean| !records.is_complex || is_along_records(*mean, &places));
+    let offset =
+        offset.filter(|mean| !records.is_complex || is_along_records(*mean, &found.places));
     let Some(offset) = offset else {
+        warn_of_missing(records, &found, observer);
         return Ok(largest);
     };
+    subtract(records, offset, observer);
+    records.outsized = f64::INFINITY;
+    let found = survey(records)?;
+    records.outsized = outsized(records, &found.sizes);
+    warn_of_missing(records, &found, observer);
+    Ok(found.sizes.largest_below(records.outsized))
+}
+
+/// Subtracts a constant offset from all samples that are read from here on, with a warning.
+fn subtract(records: &mut RawRecords, offset: Complex<f64>, observer: &dyn Observer) {
     let path = records.path.display();
     let shown = match records.is_complex {
         true => format!("{:.4e} {:+.4e} i", offset.re, offset.im),
@@ -490,10 +519,6 @@ fn largest_part(
         false => offset,
     };
     records.zero += stored / records.scale;
-    records.outsized = f64::INFINITY;
-    let sizes = survey(records)?.sizes;
-    records.outsized = outsized(records, &sizes);
-    Ok(sizes.largest_below(records.outsized))
 }
 
 #[cfg(test)]

@@ -243,6 +243,61 @@ fn missing_samples_of_any_kind_cost_their_windows_alone() {
     }
 }
 
+/// Counts of a converter as floats: -9999 is one of them, and nothing but NaN and what dwarfs all others is missing.
+#[test]
+fn counts_stored_as_floats_are_those_of_integers_and_missing_samples_are_counted() {
+    let temp = recorded_run("");
+    let folder = temp.path();
+    let (currents, _) = samples(&folder.join("o/signals.nc"));
+    let largest = currents
+        .iter()
+        .fold(0.0_f64, |most, one| most.max(one.abs()));
+    let mut counts: Vec<i16> = currents
+        .iter()
+        .map(|one| (one / largest * 20_000.0).round() as i16)
+        .collect();
+    counts[70] = -9999;
+    let estimate = |name: &str, bytes: Vec<u8>, kind: &str| -> String {
+        fs::write(folder.join(name), bytes).unwrap();
+        let folder_of = format!("of_{name}");
+        let words = [
+            "estimate",
+            name,
+            "--scene",
+            "s.toml",
+            "--format",
+            kind,
+            "--out",
+            folder_of.as_str(),
+            "--quiet",
+        ];
+        let out = wakescope(folder, &words);
+        assert!(out.status.success(), "{out:?}");
+        String::from_utf8(out.stderr).unwrap()
+    };
+    let of_i16 = counts.iter().flat_map(|count| count.to_le_bytes());
+    let said = estimate("i16", of_i16.collect(), "i16");
+    assert!(!said.contains("samples are missing"), "{said}");
+    let of_f32 = counts
+        .iter()
+        .flat_map(|count| f32::from(*count).to_le_bytes());
+    let said = estimate("f32", of_f32.collect(), "f32");
+    assert!(!said.contains("samples are missing"), "{said}");
+    for name in ["level", "v_mean_m_s"] {
+        let [a, b] =
+            ["of_i16", "of_f32"].map(|map| column(&folder.join(map).join("map.csv"), name));
+        assert_eq!(a, b, "{name}");
+    }
+    let mut missing: Vec<f64> = counts.iter().map(|count| f64::from(*count)).collect();
+    missing[70] = f64::NAN;
+    missing[90] = f64::INFINITY;
+    missing[3000] = 1e20;
+    let of_f64 = missing.iter().flat_map(|count| count.to_le_bytes());
+    let said = estimate("f64", of_f64.collect(), "f64");
+    let line = format!("3 of {} samples are missing", missing.len());
+    assert!(said.contains(&line), "{said}");
+}
+
 #[test]
 fn own_signals_obey_noise_and_scale() {
     let temp = recorded_run("");
