@@ -460,7 +460,9 @@ fn of_map(
     scan.pulse_width_s = args.pulse.or(scan.pulse_width_s);
     let are_means = args.estimator.as_deref() == Some(MEANS) || args.air.gate_std == Some(0.0);
     if are_means {
-        let stated_m = args.window.map(|window_s| 0.5 * SPEED_OF_LIGHT_M_S * window_s);
+        let stated_m = args
+            .window
+            .map(|window_s| 0.5 * SPEED_OF_LIGHT_M_S * window_s);
         scan.gate_length_m = stated_m.or(scan.gate_length_m);
     }
     // What is stated goes before what the file says.

@@ -81,7 +81,11 @@ impl RangeKernel {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a length or a spacing that is not positive, or a negative deviation.
-    pub fn rectangular_gate(pulse_std_m: f64, length_m: f64, spacing_m: f64) -> Result<Self, Error> {
+    pub fn rectangular_gate(
+        pulse_std_m: f64,
+        length_m: f64,
+        spacing_m: f64,
+    ) -> Result<Self, Error> {
         not_negative("pulse_std_m", pulse_std_m)?;
         positive("length_m", length_m)?;
         positive("spacing_m", spacing_m)?;
@@ -267,6 +271,23 @@ mod tests {
             .map(|n| (-0.5 * ((f64::from(n) - 31.5) / 16.0).powi(2)).exp())
             .collect();
         RangeKernel::gaussian_gate(120e-9, &window, 4e-9, 0.6).unwrap()
+    }
+
+    #[test]
+    fn a_rectangular_gate_has_the_variances_of_rectangle_and_pulse_and_a_flat_top() {
+        for (pulse_std_m, length_m) in [(0.0, 60.0), (4.0, 60.0), (12.0, 18.0)] {
+            let kernel = RangeKernel::rectangular_gate(pulse_std_m, length_m, 0.5).unwrap();
+            let expected_m = (length_m * length_m / 12.0 + pulse_std_m * pulse_std_m).sqrt();
+            assert_relative_eq!(kernel.width_m(), expected_m, max_relative = 1e-3);
+            assert!(kernel.moment(1, 0.0).abs() < 1e-12);
+            let middle = kernel.weights.len() / 2;
+            if length_m > 10.0 * pulse_std_m {
+                let over_middle = kernel.weights[middle + 30] / kernel.weights[middle];
+                assert!((over_middle - 1.0).abs() < 1e-3, "{over_middle}");
+            }
+        }
+        assert!(RangeKernel::rectangular_gate(-1.0, 30.0, 1.0).is_err());
+        assert!(RangeKernel::rectangular_gate(1.0, 0.0, 1.0).is_err());
     }
 
     #[test]

@@ -188,7 +188,7 @@ mod tests {
         let with = |places: &dyn Fn(usize) -> (usize, usize, usize)| -> Vec<f64> {
             let value = |place: (usize, usize, usize)| {
                 if place == (0, 1, 2) {
-                    -1.0
+                    20_000.0
                 } else {
                     of(place.0, place.1, place.2)
                 }
@@ -202,7 +202,8 @@ mod tests {
         ] {
             let mut array =
                 RawRecords::new(Path::new("x"), array(&numbers, order), [4, 3], false, true);
-            (array.fills, array.scale) = (vec![-1.0], 2.0);
+            array.scale = 2.0;
+            array.outsized = 30_000.0;
             for records in [0..4, 1..3, 3..4] {
                 for samples in [0..3, 1..2, 1..3] {
                     let found = array
