@@ -344,6 +344,28 @@ mod tests {
     }
 
     #[test]
+    fn the_bound_of_a_pulse_with_an_asymmetric_spectrum_is_that_of_its_complex_correlation() {
+        let scene = plan(
+            "[pulse.shape]\nkind = \"sampled\"\n\
+             time_s = [-200e-9, -150e-9, -100e-9, -50e-9, 0.0, 50e-9, 100e-9, 150e-9, 200e-9, 250e-9, 300e-9, 350e-9, 400e-9]\n\
+             power = [0.0, 0.2, 0.8, 1.0, 0.8, 0.5, 0.3, 0.2, 0.12, 0.07, 0.03, 0.01, 0.0]\n\
+             phase_rad = [0.0, 0.0, 0.0, 0.0, 0.2, 0.6, 1.2, 2.0, 3.0, 4.2, 5.6, 7.2, 9.0]\n\
+             [detector]\nsignal = \"baseband\"\nnoise = \"white\"\nbandwidth_hz = 60e6\nsampling_hz = 80e6\n\
+             [estimator]\nwindow_samples = 40\nwindow_step_samples = 3\ngate_step_samples = 3\n",
+        );
+        let found = bound(&scene, &Silent).unwrap().by_snr;
+        // (E12) with a natural spline through the complex amplitude, in numpy; the real part of the correlation gives 5 to 7 % more.
+        for (snr_db, expected_m_s) in [(-30.0, 93.3605), (0.0, 0.580_689), (20.0, 0.283_639)] {
+            let row = found.iter().find(|row| (row.snr_db - snr_db).abs() < 1e-9);
+            let found_m_s = row.unwrap().window_m_s;
+            assert!(
+                (found_m_s / expected_m_s - 1.0).abs() < 2e-3,
+                "{snr_db} dB: {found_m_s} {expected_m_s}"
+            );
+        }
+    }
+
+    #[test]
     fn regions_and_pulses_lower_the_bound_by_the_root_of_their_number() {
         let middle = |change: fn(&mut Scene)| of(change).unwrap().by_range[40];
         let one = middle(|s| {
