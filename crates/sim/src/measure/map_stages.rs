@@ -174,7 +174,11 @@ fn estimates_s(plan: &Plan) -> f64 {
     let point_s = lines_per_region(plan) * numbers * 5e-9 + spectrum_s;
     let points_s = n.cells * n.realisations * point_s;
     let bounded = match e.radius {
-        RegionRadius::Target { .. } => bound_samples(plan).powi(3),
+        // Once for each gate.
+        RegionRadius::Target { .. } => {
+            let gates = plan.geometry.gate_range_m.len() as f64;
+            gates / 17.0 * bound_rows(plan).powi(3)
+        }
         _ => 0.0,
     };
     let planned_s = 4e-8 * (method.covariances() * window.powi(3) + bounded);
