@@ -48,7 +48,7 @@ fn with_stages(mut plan: Plan, memo: &EfficiencyMemo) -> Result<Plan, Error> {
         .extend(screens::warnings(&plan, &screen_plans));
     plan.screens = screen_plans;
     plan.warnings.extend(map_stages::warnings(&plan)?);
-    plan.warnings.extend(clipping::warning(&plan)?);
+    plan.warnings.extend(clipping::warning(&plan));
     let retrieval = retrieve::stage::planned(&plan)?;
     plan.stages = vec![
         PlannedStage::skipped(Stage::FlowSimulation, &plan.wind.source),

@@ -16,25 +16,21 @@ const FEW: f64 = 1e-3;
 /// Full scale that clips this fraction, over the standard deviation of the samples, rounded up.
 const SUFFICIENT: f64 = 3.4;
 /// Ranges at which the signal is looked at.
-const POINTS: usize = 65;
+const POINTS: usize = 33;
 
-/// Where noise and signal together are clipped, and by which full scale they are not.
-///
-/// # Errors
-/// What optics and signals refuse; a checked scene gives none.
-pub(crate) fn warning(plan: &Plan) -> Result<Option<String>, Error> {
+/// Where noise and signal together are clipped, and by which full scale they are not; nothing where the signal is not known without
+/// phase screens.
+pub(crate) fn warning(plan: &Plan) -> Option<String> {
     let scene = plan.scene();
     let Digitiser::Quantised {
         full_scale_over_noise,
         ..
     } = scene.detector.digitiser
     else {
-        return Ok(None);
+        return None;
     };
-    let Some(converter) = instrument::converter(scene) else {
-        return Ok(None);
-    };
-    let [range_m, snr] = strongest(plan)?;
+    let converter = instrument::converter(scene)?;
+    let [range_m, snr] = strongest(plan).ok()?;
     let receiver = &plan.instrument.receiver;
     // The ratio counts the converter's own noise, which is not at its input.
     let front = &receiver.front_end;
@@ -50,7 +46,7 @@ pub(crate) fn warning(plan: &Plan) -> Result<Option<String>, Error> {
     };
     let input_over_noise = (of_noise + of_signal).sqrt();
     if input_over_noise == 0.0 || !input_over_noise.is_finite() {
-        return Ok(None);
+        return None;
     }
     // Speckle is Gaussian, as noise is.
     let strong = Converter {
@@ -59,19 +55,22 @@ pub(crate) fn warning(plan: &Plan) -> Result<Option<String>, Error> {
     };
     let clipped = strong.clipping().clipped_fraction;
     if clipped <= FEW {
-        return Ok(None);
+        return None;
     }
     let enough = (SUFFICIENT * input_over_noise).ceil();
-    Ok(Some(format!(
+    Some(format!(
         "detector.digitiser.full_scale_over_noise = {full_scale_over_noise} clips {:.1} % of the samples at {range_m:.0} m, where signal \
          and noise are {input_over_noise:.1} times the noise in the band: ratios of maps come out too low; {enough:.0} or more clips fewer \
          than {} %",
         100.0 * clipped,
         100.0 * FEW,
-    )))
+    ))
 }
 
 /// Range of the scan, m, from which the signal is strongest, and its signal-to-noise ratio there, a power ratio.
+///
+/// # Errors
+/// What optics and signals refuse, such as a range beyond the theory of turbulence.
 fn strongest(plan: &Plan) -> Result<[f64; 2], Error> {
     let scene = plan.scene();
     let first_m = scene.scan.range_min_m;
