@@ -57,7 +57,9 @@ pub(crate) fn warning(plan: &Plan) -> Option<String> {
     if clipped <= FEW {
         return None;
     }
-    let enough = (SUFFICIENT * input_over_noise).ceil();
+    // The highest of 2^bits codes is below full scale.
+    let highest = 1.0 - (-f64::from(converter.bits)).exp2();
+    let enough = (SUFFICIENT * input_over_noise / highest).ceil();
     Some(format!(
         "detector.digitiser.full_scale_over_noise = {full_scale_over_noise} clips {:.1} % of the samples at {range_m:.0} m, where signal \
          and noise are {input_over_noise:.1} times the noise in the band: ratios of maps come out too low; {enough:.0} or more clips fewer \
