@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::measure::profile::EfficiencyMemo;
-use crate::measure::{map_stages, plane, profile, scan_stages, screens};
+use crate::measure::{clipping, map_stages, plane, profile, scan_stages, screens};
 use crate::plan::wind::SceneWind;
 use crate::plan::{Plan, PlannedStage, Stage, Target};
 use crate::retrieve;
@@ -48,6 +48,7 @@ fn with_stages(mut plan: Plan, memo: &EfficiencyMemo) -> Result<Plan, Error> {
         .extend(screens::warnings(&plan, &screen_plans));
     plan.screens = screen_plans;
     plan.warnings.extend(map_stages::warnings(&plan)?);
+    plan.warnings.extend(clipping::warning(&plan));
     let retrieval = retrieve::stage::planned(&plan)?;
     plan.stages = vec![
         PlannedStage::skipped(Stage::FlowSimulation, &plan.wind.source),

@@ -7,6 +7,7 @@
 //! long records against the sum over frequencies, a maximum likelihood of the whole record.
 
 use ndarray::{Array2, s};
+use num_complex::Complex;
 
 use super::Noise;
 use super::window_model::{LEAST_CONDITION, turned};
@@ -20,19 +21,23 @@ const WHOLE_SAMPLES: usize = 256;
 /// Correlation of the signal below which samples count as independent.
 const UNCORRELATED: f64 = 1e-3;
 
+/// Imaginary parts of the correlation up to this are rounding: the spectrum of the pulse is symmetric.
+const SYMMETRIC: f64 = 1e-12;
+
 /// Second-order model of the record of one pulse, air at rest in the middle of the band.
 #[derive(Debug, Clone)]
 pub struct RecordModel {
     sampling: Sampling,
     kind: SignalKind,
     noise: Noise,
-    correlation: Vec<f64>,
+    correlation: Vec<Complex<f64>>,
     is_gaussian: bool,
 }
 
 impl RecordModel {
-    /// `correlation` of the signal's envelope at lags of 0, 1, 2 .. samples, 1 at lag 0 and nothing beyond the last; `is_gaussian` for a
-    /// Gaussian pulse, whose f(a) f(b) is that correlation times |f((a + b)/2)|^2.
+    /// `correlation` E{x(t + lag) x*(t)} of the signal's envelope at lags of 0, 1, 2 .. samples, 1 at lag 0 and nothing beyond the last; it is
+    /// real for a pulse with a symmetric spectrum. `is_gaussian` for a Gaussian pulse, whose f(a) f(b) is that correlation times
+    /// |f((a + b)/2)|^2.
     ///
     /// # Errors
     /// [`Error::Empty`], [`Error::Band`] or [`Error::OutOfRange`] for impossible input.
@@ -40,7 +45,7 @@ impl RecordModel {
         sampling: &Sampling,
         kind: SignalKind,
         noise: Noise,
-        correlation: Vec<f64>,
+        correlation: Vec<Complex<f64>>,
         is_gaussian: bool,
     ) -> Result<Self, Error> {
         sampling.validate_for(kind)?;
@@ -76,12 +81,13 @@ impl RecordModel {
         let memory = self
             .correlation
             .iter()
-            .rposition(|c| c.abs() > UNCORRELATED)
+            .rposition(|c| c.norm() > UNCORRELATED)
             .unwrap_or(0);
         let most = WHOLE_SAMPLES.max(gates.window_samples + memory);
         let (positions, ends) = rows(gates, count, most);
+        let numbers = self.numbers_per_sample();
         let [covariance, mut derivative] = self.matrices(&positions, &snr);
-        let order = positions.len();
+        let order = covariance.nrows();
         let failed = Error::Linalg {
             what: "covariance of a record",
             order,
@@ -92,14 +98,16 @@ impl RecordModel {
             forward(factor.view(), &mut derivative);
             derivative = derivative.reversed_axes().as_standard_layout().into_owned();
         }
+        // The trace of matrices of real and imaginary parts is twice that of the complex ones.
+        let share = self.kind.one_sided_share() / numbers as f64;
         let mut sum = 0.0;
         let mut so_far = Vec::with_capacity(order);
         for n in 0..order {
             let off: f64 = derivative.slice(s![n, ..n]).iter().map(|x| x * x).sum();
-            sum += self.kind.one_sided_share() * (2.0 * off + derivative[[n, n]].powi(2));
+            sum += share * (2.0 * off + derivative[[n, n]].powi(2));
             so_far.push(sum);
         }
-        let mut information: Vec<f64> = ends.iter().map(|end| so_far[end - 1]).collect();
+        let mut information: Vec<f64> = ends.iter().map(|end| so_far[numbers * end - 1]).collect();
         if let [.., first, _, _, _, end] = information[..] {
             for more in 1..=count - information.len() {
                 information.push(end + 0.25 * (end - first) * more as f64);
@@ -108,24 +116,31 @@ impl RecordModel {
         Ok(information)
     }
 
+    /// Rows of the matrices for each sample: two for complex samples whose correlation is not real.
+    fn numbers_per_sample(&self) -> usize {
+        let mut largest: f64 = 0.0;
+        for value in &self.correlation {
+            largest = largest.max(value.im.abs());
+        }
+        match self.kind {
+            SignalKind::Complex if largest > SYMMETRIC => 2,
+            _ => 1,
+        }
+    }
+
     /// Covariance of the samples at `positions` and its derivative with respect to velocity, noise in the band having unit power.
     ///
-    /// Both are real: real samples are, and so are complex ones at rest except for a derivative that is imaginary and antisymmetric, of
-    /// which the imaginary part serves as well.
+    /// Both are real. Real samples are, and so are complex ones of a symmetric spectrum at rest, except for a derivative that is
+    /// imaginary and antisymmetric, of which the imaginary part serves as well. Other complex matrices X + jY are stored as
+    /// blocks (X, -Y; Y, X), the two rows of a sample together, so that leading samples are leading rows.
     fn matrices(&self, positions: &[f64], snr: &dyn Fn(f64) -> f64) -> [Array2<f64>; 2] {
-        let sampling = &self.sampling;
-        let cycles = sampling.intermediate_frequency_hz * sampling.period_s();
-        let slope = sampling.phase_slope();
-        let signal = self.signal(positions, snr);
-        let derivative = Array2::from_shape_fn(signal.dim(), |(n, m)| {
-            let lag = positions[n] - positions[m];
-            let turn = match self.kind {
-                SignalKind::Real => -turned(cycles, lag).sin(),
-                SignalKind::Complex => 1.0,
-            };
-            slope * lag * signal[[n, m]] * turn
-        });
-        let covariance = self.covariance(positions, &signal, self.noise);
+        let signal = Signal::new(self, positions, snr);
+        let derivative = if self.numbers_per_sample() == 2 {
+            self.complex_derivative(&signal)
+        } else {
+            self.real_derivative(&signal)
+        };
+        let covariance = self.covariance(&signal, self.noise);
         let Noise::Band { floor } = self.noise else {
             return [covariance, derivative];
         };
@@ -135,45 +150,46 @@ impl RecordModel {
             largest = f64::max(largest, sum);
         }
         let white = self.noise_at(0.0, Noise::White);
-        let least = LEAST_CONDITION * positions.len() as f64 * largest / white;
+        let least = LEAST_CONDITION * covariance.nrows() as f64 * largest / white;
         if floor < least {
             let raised = Noise::Band {
                 floor: least.min(1.0),
             };
-            return [self.covariance(positions, &signal, raised), derivative];
+            return [self.covariance(&signal, raised), derivative];
         }
         [covariance, derivative]
     }
 
-    /// Covariance of the signal at `positions`, the carrier removed.
-    fn signal(&self, positions: &[f64], snr: &dyn Fn(f64) -> f64) -> Array2<f64> {
-        // Two samples of a Gaussian pulse share the air in the middle between them: ratios at every half sample.
-        let first = positions.iter().copied().fold(positions[0], f64::min);
-        let last = positions.iter().copied().fold(positions[0], f64::max);
-        let mut ratios = Vec::new();
-        for half in 0..=(2.0 * (last - first)) as usize {
-            ratios.push(snr(first + 0.5 * half as f64));
-        }
-        let order = positions.len();
+    /// Derivative of the covariance of real samples, or the imaginary part of that of complex ones whose correlation is real.
+    fn real_derivative(&self, signal: &Signal<'_>) -> Array2<f64> {
+        let cycles = self.sampling.intermediate_frequency_hz * self.sampling.period_s();
+        let slope = self.sampling.phase_slope();
+        let order = signal.positions.len();
         Array2::from_shape_fn((order, order), |(n, m)| {
-            let outer = positions[n.max(m)];
-            let inner = positions[n.min(m)];
-            let lag = (outer - inner).abs() as usize;
-            let correlation = self.correlation.get(lag).copied().unwrap_or(0.0);
-            if correlation == 0.0 {
-                return 0.0;
+            let lag = signal.positions[n] - signal.positions[m];
+            let value = signal.between(n, m);
+            match self.kind {
+                SignalKind::Real => {
+                    let (sin, cos) = turned(cycles, lag).sin_cos();
+                    slope * lag * value.re * -sin - slope * lag * value.im * cos
+                }
+                SignalKind::Complex => slope * lag * value.re,
             }
-            if self.is_gaussian {
-                return correlation * ratios[(outer + inner - 2.0 * first) as usize];
-            }
-            let of_outer = ratios[(outer + outer - 2.0 * first) as usize];
-            let of_inner = ratios[(inner + inner - 2.0 * first) as usize];
-            correlation * (of_outer * of_inner).sqrt()
         })
     }
 
-    /// Covariance of the samples at `positions` for that of the signal without its carrier.
-    fn covariance(&self, positions: &[f64], signal: &Array2<f64>, noise: Noise) -> Array2<f64> {
+    /// Derivative of the covariance of complex samples, j slope lag times that of the signal, as real and imaginary parts.
+    fn complex_derivative(&self, signal: &Signal<'_>) -> Array2<f64> {
+        let slope = self.sampling.phase_slope();
+        real_and_imaginary(signal.positions.len(), |n, m| {
+            let lag = signal.positions[n] - signal.positions[m];
+            signal.between(n, m) * Complex::new(0.0, slope * lag)
+        })
+    }
+
+    /// Covariance of the samples of a signal in noise.
+    fn covariance(&self, signal: &Signal<'_>, noise: Noise) -> Array2<f64> {
+        let positions = signal.positions;
         let cycles = self.sampling.intermediate_frequency_hz * self.sampling.period_s();
         let farthest = positions
             .iter()
@@ -182,13 +198,24 @@ impl RecordModel {
         for lag in 0..=(2.0 * farthest) as usize {
             of_noise.push(self.noise_at(lag as f64, noise));
         }
-        Array2::from_shape_fn(signal.dim(), |(n, m)| {
+        let order = positions.len();
+        if self.numbers_per_sample() == 2 {
+            return real_and_imaginary(order, |n, m| {
+                let lag = positions[n] - positions[m];
+                signal.between(n, m) + of_noise[lag.abs() as usize]
+            });
+        }
+        Array2::from_shape_fn((order, order), |(n, m)| {
             let lag = positions[n] - positions[m];
-            let turn = match self.kind {
-                SignalKind::Real => turned(cycles, lag).cos(),
-                SignalKind::Complex => 1.0,
+            let value = signal.between(n, m);
+            let of_signal = match self.kind {
+                SignalKind::Real => {
+                    let (sin, cos) = turned(cycles, lag).sin_cos();
+                    value.re * cos - value.im * sin
+                }
+                SignalKind::Complex => value.re,
             };
-            signal[[n, m]] * turn + of_noise[lag.abs() as usize]
+            of_signal + of_noise[lag.abs() as usize]
         })
     }
 
@@ -198,6 +225,67 @@ impl RecordModel {
         let density = sampling.sample_rate_hz / (sampling.band_hz.1 - sampling.band_hz.0);
         noise.covariance(sampling, lag, self.kind).re * density
     }
+}
+
+/// The signal in samples of a record, its carrier removed.
+struct Signal<'a> {
+    model: &'a RecordModel,
+    positions: &'a [f64],
+    /// Least position.
+    first: f64,
+    /// Signal-to-noise ratios at every half sample from there: two samples of a Gaussian pulse share the air in the middle between them.
+    ratios: Vec<f64>,
+}
+
+impl<'a> Signal<'a> {
+    fn new(model: &'a RecordModel, positions: &'a [f64], snr: &dyn Fn(f64) -> f64) -> Self {
+        let first = positions.iter().copied().fold(positions[0], f64::min);
+        let last = positions.iter().copied().fold(positions[0], f64::max);
+        let mut ratios = Vec::new();
+        for half in 0..=(2.0 * (last - first)) as usize {
+            ratios.push(snr(first + 0.5 * half as f64));
+        }
+        Self {
+            model,
+            positions,
+            first,
+            ratios,
+        }
+    }
+
+    /// Covariance of the samples at two positions, given by their indices.
+    fn between(&self, n: usize, m: usize) -> Complex<f64> {
+        let late = self.positions[n];
+        let early = self.positions[m];
+        let lag = (late - early).abs() as usize;
+        let none = Complex::new(0.0, 0.0);
+        let known = self.model.correlation.get(lag).copied().unwrap_or(none);
+        if known == none {
+            return none;
+        }
+        let correlation = if late < early { known.conj() } else { known };
+        if self.model.is_gaussian {
+            return correlation * self.ratios[(late + early - 2.0 * self.first) as usize];
+        }
+        let of_late = self.ratios[(late + late - 2.0 * self.first) as usize];
+        let of_early = self.ratios[(early + early - 2.0 * self.first) as usize];
+        correlation * (of_late * of_early).sqrt()
+    }
+}
+
+/// A complex matrix of an order as a real one of twice that order: the two rows and columns of an element together.
+fn real_and_imaginary(order: usize, element: impl Fn(usize, usize) -> Complex<f64>) -> Array2<f64> {
+    let mut matrix = Array2::zeros((2 * order, 2 * order));
+    for n in 0..order {
+        for m in 0..order {
+            let value = element(n, m);
+            matrix[[2 * n, 2 * m]] = value.re;
+            matrix[[2 * n, 2 * m + 1]] = -value.im;
+            matrix[[2 * n + 1, 2 * m]] = value.im;
+            matrix[[2 * n + 1, 2 * m + 1]] = value.re;
+        }
+    }
+    matrix
 }
 
 /// Positions of the samples of windows about a middle, in samples from it, window after window from the innermost one, and the number

@@ -242,13 +242,19 @@ pub(crate) fn turned(cycles: f64, lag: f64) -> f64 {
     std::f64::consts::TAU * (product - product.round() + rest)
 }
 
+/// Mean of the diagonal of an envelope; 0 without samples.
+fn mean_power(envelope: &Array2<Complex<f64>>) -> f64 {
+    let powers = envelope.diag().mapv(|value| value.re);
+    powers.mean().unwrap_or(0.0)
+}
+
 /// Second-order model of a window: signal envelope, carrier, and noise at a given SNR.
 ///
 /// R(n, m) = envelope(n, m) exp(j 2 pi f (t_n - t_m)) + noise, with f from (30); real samples take the real part.
 #[derive(Debug, Clone)]
 pub struct WindowModel {
     pub(crate) sampling: Sampling,
-    envelope: Array2<f64>,
+    envelope: Array2<Complex<f64>>,
     /// Half-width at 1/e of a Gaussian pulse \[s\], whose covariance is known beyond double precision.
     gaussian_sigma_s: Option<f64>,
     noise: Noise,
@@ -270,7 +276,7 @@ impl WindowModel {
         positive("pulse_sigma_s", pulse_sigma_s)?;
         let envelope = Array2::from_shape_fn((window_samples, window_samples), |(n, m)| {
             let lag_s = (n as f64 - m as f64) * sampling.period_s();
-            (-0.25 * (lag_s / pulse_sigma_s).powi(2)).exp()
+            Complex::from((-0.25 * (lag_s / pulse_sigma_s).powi(2)).exp())
         });
         Ok(Self {
             gaussian_sigma_s: Some(pulse_sigma_s),
@@ -289,27 +295,25 @@ impl WindowModel {
     ) -> Result<Self, Error> {
         let window_samples = amplitude.len();
         let envelope = Array2::from_shape_fn((window_samples, window_samples), |(n, m)| {
-            amplitude[n] * amplitude[m]
+            Complex::from(amplitude[n] * amplitude[m])
         });
         Self::with_envelope(sampling, envelope, noise)
     }
 
-    /// Any real, symmetric envelope \[n, m\] of the covariance, the carrier at 0 Hz removed.
+    /// Any Hermitian envelope \[n, m\] = E{x(t_n) x*(t_m)} of the covariance, its carrier removed; it is real for a pulse with a
+    /// symmetric spectrum.
     ///
     /// # Errors
     /// [`Error::Empty`], [`Error::Length`], [`Error::Band`] or [`Error::OutOfRange`] for impossible input.
     pub fn with_envelope(
         sampling: &Sampling,
-        envelope: Array2<f64>,
+        envelope: Array2<Complex<f64>>,
         noise: Noise,
     ) -> Result<Self, Error> {
         sampling.validate()?;
         not_empty("envelope", envelope.len())?;
         length("envelope", envelope.nrows(), envelope.ncols())?;
-        positive(
-            "mean of the envelope's diagonal",
-            envelope.diag().mean().unwrap_or(0.0),
-        )?;
+        positive("mean of the envelope's diagonal", mean_power(&envelope))?;
         noise.validate()?;
         Ok(Self {
             sampling: *sampling,
@@ -321,7 +325,7 @@ impl WindowModel {
 
     /// The envelope of the covariance \[n, m\].
     #[must_use]
-    pub fn envelope(&self) -> &Array2<f64> {
+    pub fn envelope(&self) -> &Array2<Complex<f64>> {
         &self.envelope
     }
 
@@ -343,7 +347,7 @@ impl WindowModel {
         let sampling = &self.sampling;
         sampling.validate_for(kind)?;
         let samples = self.envelope.nrows();
-        let power = self.envelope.diag().mean().unwrap_or(0.0);
+        let power = mean_power(&self.envelope);
         let cycles = sampling.frequency_hz(velocity_m_s) * sampling.period_s();
         let bandwidth = (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz;
         let density = power / (snr * bandwidth);

@@ -18,8 +18,8 @@ const LEAST_WEIGHT: f64 = 1e-3;
 ///
 /// Their factors add to 1, so white noise reads its variance. Feed them to
 /// [`Correlogram::with_tapers`](crate::Correlogram::with_tapers) and the peak to [`SpectralPeak`](crate::SpectralPeak).
-/// The noise counts as white with the density that it has in the band. Exact for circular complex windows; for real ones
-/// the mirror image is neglected.
+/// The noise counts as white with the density that it has in the band. Exact for circular complex windows of a pulse with a
+/// symmetric spectrum: tapers are real, of the real part of the envelope. For real windows the mirror image is neglected.
 ///
 /// # Errors
 /// [`Error::OutOfRange`] if `snr` is not above 0; [`Error::Linalg`] if the envelope is no covariance.
@@ -27,7 +27,7 @@ pub fn likelihood_tapers(model: &WindowModel, snr: f64) -> Result<Vec<Taper>, Er
     positive("snr", snr)?;
     let noise_to_signal =
         model.sampling.sample_rate_hz / (model.sampling.band_hz.1 - model.sampling.band_hz.0) / snr;
-    let envelope = model.envelope();
+    let envelope = model.envelope().mapv(|value| value.re);
     let power = envelope.diag().mean().unwrap_or(1.0);
     let (values, vectors) = hermitian_eigen("envelope", envelope.view())?;
     let weights = values.mapv(|value| (value / (value + noise_to_signal * power)).max(0.0));

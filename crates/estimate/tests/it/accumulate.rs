@@ -570,39 +570,50 @@ fn automatic_radius_is_the_smallest_that_reaches_the_target() {
             .collect()
     };
     let target_m_s = 0.2;
-    let radius = Radius::for_standard_deviation(&geometry, by_gates, target_m_s, 20.0).unwrap();
-    let mut before_m = 0.0;
-    for range_m in [380.0, 450.0, 600.0, 800.0] {
-        let radius_m = radius.at_m(range_m).unwrap();
+    let ranges_m = [380.0, 450.0, 600.0, 800.0];
+    let information = |range_m: f64, radius_m: f64| -> Result<f64, Error> {
         let point = PolarPoint::at_elevation(range_m, elevation_rad[50]);
-        let std_m_s = |radius_m: f64| {
-            geometry.information(point, radius_m, [&by_gates(range_m)])[0]
-                .sqrt()
-                .recip()
-        };
+        Ok(geometry.information(point, radius_m, [&by_gates(range_m)])[0])
+    };
+    let std_m_s =
+        |range_m: f64, radius_m: f64| information(range_m, radius_m).unwrap().sqrt().recip();
+    let radius = Radius::for_standard_deviation(&ranges_m, information, target_m_s, 20.0).unwrap();
+    let mut before_m = 0.0;
+    for range_m in ranges_m {
+        let radius_m = radius.at_m(range_m).unwrap();
+        // Steps of a thousandth of the largest radius.
         assert!(
-            std_m_s(radius_m * 1.1) < target_m_s && std_m_s(radius_m * 0.6) > target_m_s,
+            std_m_s(range_m, radius_m) <= target_m_s
+                && std_m_s(range_m, radius_m - 0.02) > target_m_s,
             "{range_m}: {radius_m}"
         );
         assert!(radius_m > before_m);
         before_m = radius_m;
     }
+    // elsewhere that of the nearest range
+    for (range_m, nearest_m) in [
+        (100.0, 380.0),
+        (524.0, 450.0),
+        (526.0, 600.0),
+        (900.0, 800.0),
+    ] {
+        assert_eq!(
+            radius.at_m(range_m).unwrap(),
+            radius.at_m(nearest_m).unwrap()
+        );
+    }
     // out of reach: the largest
-    let modest = Radius::for_standard_deviation(&geometry, by_gates, 1e-3, 5.0).unwrap();
+    let modest = Radius::for_standard_deviation(&ranges_m, information, 1e-3, 5.0).unwrap();
     assert_eq!(modest.at_m(600.0).unwrap(), 5.0);
-    assert!(Radius::for_standard_deviation(&geometry, by_gates, 0.0, 5.0).is_err());
-    let point = PolarPoint::at_elevation(400.0, 0.05);
-    assert_eq!(
-        geometry
-            .radius_for(point, 1e9, &by_gates(400.0), 5.0)
-            .unwrap(),
-        None
-    );
-    assert!(
-        geometry
-            .radius_for(point, 0.0, &by_gates(400.0), 5.0)
-            .is_err()
-    );
+    for (ranges_m, target_m_s, largest_m) in [
+        (ranges_m.to_vec(), 0.0, 5.0),
+        (ranges_m.to_vec(), 0.2, 0.0),
+        (vec![], 0.2, 5.0),
+        (vec![400.0, 300.0], 0.2, 5.0),
+    ] {
+        let refused = Radius::for_standard_deviation(&ranges_m, information, target_m_s, largest_m);
+        assert!(refused.is_err(), "{ranges_m:?} {target_m_s} {largest_m}");
+    }
 }
 
 /// Products of the samples of two lines with four rays each, `[line][sample, lag]`.

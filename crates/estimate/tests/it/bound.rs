@@ -300,7 +300,9 @@ fn rows_m_s(
     snr: f64,
 ) -> Vec<f64> {
     let lag = |m: usize| m as f64 * sampling.period_s() / sigma_s;
-    let correlation = (0..2000).map(|m| (-0.25 * lag(m).powi(2)).exp()).collect();
+    let correlation = (0..2000)
+        .map(|m| Complex::from((-0.25 * lag(m).powi(2)).exp()))
+        .collect();
     let model = RecordModel::new(sampling, kind, noise, correlation, true).unwrap();
     let gates = Gates::new(window, step, 0.0).unwrap();
     model
@@ -343,6 +345,49 @@ fn bound_of_windows_in_a_row_is_that_of_the_samples_that_they_cover() {
                     let expected_m_s = whole.bound_m_s(0.0, snr, kind, 1.0).unwrap();
                     // Rounding is magnified by the condition of the covariance.
                     assert_relative_eq!(found_m_s[windows - 1], expected_m_s, max_relative = 1e-5);
+                }
+            }
+        }
+    }
+}
+
+/// Correlation of a pulse with two spectral lines of different powers at a lag in samples.
+fn two_lines(lag: i64) -> Complex<f64> {
+    let lag = lag as f64;
+    (Complex::from_polar(0.3, 0.15 * lag) + 0.7) * (-(lag / 40.0).powi(2)).exp()
+}
+
+#[test]
+fn an_asymmetric_spectrum_lowers_the_bound_of_records_as_that_of_windows() {
+    // Of one window in white noise at a ratio of 2: numpy.
+    for (sampling, kind, one_m_s) in [
+        (table_2(), SignalKind::Real, 3.161_157_845),
+        (baseband(), SignalKind::Complex, 3.145_512_019),
+    ] {
+        for noise in [Noise::White, Noise::Band { floor: 1e-4 }] {
+            let correlation = (0..400).map(two_lines).collect();
+            let record = RecordModel::new(&sampling, kind, noise, correlation, false).unwrap();
+            let gates = Gates::new(16, 5, 0.0).unwrap();
+            let found = record.information(&gates, 6, |_| 2.0).unwrap();
+            for windows in [1, 3, 6] {
+                let found_m_s = found[windows - 1].sqrt().recip();
+                let samples = 16 + 5 * (windows - 1);
+                let envelope = Array2::from_shape_fn((samples, samples), |(n, m)| {
+                    two_lines(n as i64 - m as i64)
+                });
+                let real = envelope.mapv(|value| Complex::from(value.re));
+                let bound_m_s = |envelope| {
+                    WindowModel::with_envelope(&sampling, envelope, noise)
+                        .unwrap()
+                        .bound_m_s(0.0, 2.0, kind, 1.0)
+                        .unwrap()
+                };
+                let whole_m_s = bound_m_s(envelope);
+                assert_relative_eq!(found_m_s, whole_m_s, max_relative = 1e-6);
+                let of_real_part_m_s = bound_m_s(real);
+                assert!(found_m_s < 0.94 * of_real_part_m_s, "{found_m_s}");
+                if windows == 1 && noise == Noise::White {
+                    assert_relative_eq!(found_m_s, one_m_s, max_relative = 1e-8);
                 }
             }
         }
@@ -395,7 +440,7 @@ fn bound_beside_a_cloud_is_that_of_the_sum_over_its_layers() {
             .sum()
     };
     let correlation = (0..200)
-        .map(|m| (-0.25 * (f64::from(m) / sigma).powi(2)).exp())
+        .map(|m| Complex::from((-0.25 * (f64::from(m) / sigma).powi(2)).exp()))
         .collect();
     let model = RecordModel::new(
         &sampling,

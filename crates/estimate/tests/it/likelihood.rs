@@ -42,7 +42,7 @@ fn draw(
 /// Tapers and eigenvalues of the pulse covariance down to 1e-3 of the largest, from the weights at a high SNR.
 fn basis(full_width_s: f64) -> (Vec<Taper>, Vec<f64>) {
     let tapers = likelihood_tapers(&model(full_width_s), 5e3).unwrap();
-    let envelope = model(full_width_s).envelope().to_owned();
+    let envelope = model(full_width_s).envelope().mapv(|value| value.re);
     let values = tapers
         .iter()
         .map(|taper| {

@@ -126,27 +126,73 @@ impl Receiver {
         }
     }
 
-    /// Power of the local oscillator that gives the best signal-to-noise ratio \[W\]: 0 if there is
-    /// only shot noise, `inf` if nothing limits it.
-    ///
-    /// For amplifier noise and saturation `P_s (sqrt(4 A^2 + 3 A) - A)/(3 (1 + A))`,
-    /// `A = i_n^2/(2 e S P_s)`.
-    pub fn best_local_oscillator_w(&self) -> f64 {
-        let per_watt = Self {
+    /// Power of the local oscillator at which its shot noise equals the amplifier's \[W\]; `inf` where saturation keeps it below at any
+    /// power.
+    pub fn amplifier_equals_shot_w(&self) -> f64 {
+        let per_watt = self.with_unsaturated_watt().noise_densities();
+        let unsaturated_w = per_watt.amplifier_a2_hz / per_watt.shot_a2_hz;
+        let saturation_w = self.front_end.saturation_w;
+        if unsaturated_w < saturation_w {
+            // Of P/(1 + P/P_s) = unsaturated_w.
+            unsaturated_w / (1.0 - unsaturated_w / saturation_w)
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Lowest power of the local oscillator at which its intensity noise equals its shot noise \[W\]; `inf` where it stays below at
+    /// any power, as without intensity noise.
+    pub fn intensity_equals_shot_w(&self) -> f64 {
+        let per_watt = self.with_unsaturated_watt().noise_densities();
+        let unsaturated_w = per_watt.shot_a2_hz / per_watt.intensity_a2_hz;
+        let saturation_w = self.front_end.saturation_w;
+        if saturation_w.is_infinite() {
+            return unsaturated_w;
+        }
+        // P/(1 + P/P_s)^3 rises to its largest value at P_s/2 and falls beyond.
+        let reached = |power_w: f64| power_w / (1.0 + power_w / saturation_w).powi(3);
+        let mut high_w = 0.5 * saturation_w;
+        if unsaturated_w > reached(high_w) {
+            return f64::INFINITY;
+        }
+        let mut low_w = 0.0;
+        // Each step halves the interval; after these it is one number wide.
+        for _ in 0..200 {
+            let middle_w = 0.5 * (low_w + high_w);
+            if reached(middle_w) < unsaturated_w {
+                low_w = middle_w
+            } else {
+                high_w = middle_w
+            }
+        }
+        high_w
+    }
+
+    /// The same receiver with a local oscillator of 1 W that saturates nothing.
+    fn with_unsaturated_watt(&self) -> Self {
+        Self {
             local_oscillator_w: 1.0,
             front_end: FrontEnd {
                 saturation_w: f64::INFINITY,
                 ..self.front_end
             },
             ..*self
-        };
+        }
+    }
+
+    /// Power of the local oscillator that gives the best signal-to-noise ratio \[W\]: 0 if there is
+    /// only shot noise, `inf` if nothing limits it.
+    ///
+    /// For amplifier noise and saturation `P_s (sqrt(4 A^2 + 3 A) - A)/(3 (1 + A))`,
+    /// `A = i_n^2/(2 e S P_s)`.
+    pub fn best_local_oscillator_w(&self) -> f64 {
         let NoiseDensities {
             shot_a2_hz,
             amplifier_a2_hz,
             dark_a2_hz,
             intensity_a2_hz,
             response,
-        } = per_watt.noise_densities();
+        } = self.with_unsaturated_watt().noise_densities();
         let constant = amplifier_a2_hz / response + dark_a2_hz;
         if constant == 0.0 {
             return 0.0;

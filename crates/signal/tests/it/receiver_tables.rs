@@ -107,6 +107,75 @@ fn noise_densities_and_what_they_cost_are_the_stored_ones() {
 }
 
 #[test]
+fn noises_equal_shot_noise_at_powers_that_saturation_raises_or_removes() {
+    let front_end = FrontEnd {
+        amplifier_noise_a_rthz: 10e-12,
+        load_ohm: 200.0,
+        load_temperature_k: 310.0,
+        intensity_noise_db_hz: -150.0,
+        rejection_db: 20.0,
+        saturation_w: 5e-3,
+        ..FrontEnd::IDEAL
+    };
+    for local_oscillator_w in [1e-4, 2e-3, 0.1] {
+        let receiver = |front_end: FrontEnd| Receiver {
+            wavelength_m: 2.05e-6,
+            quantum_efficiency: 0.7,
+            local_oscillator_w,
+            ..with(front_end)
+        };
+        // 500.44 uW = P/(1 + P/P_s), and 27.686 mW = P/(1 + P/P_s)^3, which is at most 4 P_s/27.
+        let saturated = receiver(front_end);
+        assert_relative_eq!(
+            saturated.amplifier_equals_shot_w(),
+            556.10e-6,
+            max_relative = 1e-5
+        );
+        assert_eq!(saturated.intensity_equals_shot_w(), f64::INFINITY);
+        let free = receiver(FrontEnd {
+            saturation_w: f64::INFINITY,
+            ..front_end
+        });
+        assert_relative_eq!(
+            free.amplifier_equals_shot_w(),
+            500.44e-6,
+            max_relative = 1e-5
+        );
+        assert_relative_eq!(
+            free.intensity_equals_shot_w(),
+            27.6857e-3,
+            max_relative = 1e-5
+        );
+        let low = receiver(FrontEnd {
+            saturation_w: 0.4e-3,
+            ..front_end
+        });
+        assert_eq!(low.amplifier_equals_shot_w(), f64::INFINITY);
+        let high = receiver(FrontEnd {
+            saturation_w: 1.0,
+            ..front_end
+        });
+        let equal_w = high.intensity_equals_shot_w();
+        let noises = Receiver {
+            local_oscillator_w: equal_w,
+            ..high
+        }
+        .noise_densities();
+        assert!(equal_w > 27.7e-3 && equal_w < 0.5, "{equal_w}");
+        assert_relative_eq!(
+            noises.intensity_a2_hz,
+            noises.shot_a2_hz,
+            max_relative = 1e-9
+        );
+    }
+    assert_eq!(
+        with(FrontEnd::IDEAL).intensity_equals_shot_w(),
+        f64::INFINITY
+    );
+    assert_eq!(with(FrontEnd::IDEAL).amplifier_equals_shot_w(), 0.0);
+}
+
+#[test]
 fn saturation_costs_what_is_stored_and_its_best_local_oscillator_is_the_best() {
     for [
         local_oscillator_w,

@@ -5,7 +5,7 @@ use crate::measure::accumulation::{draws_products, lags_per_window};
 use crate::measure::region;
 use crate::measure::scan_stages::{scan_bytes, wind_bytes};
 use crate::plan::{Plan, PlannedStage, Stage};
-use crate::scene::{Estimator, RegionRadius};
+use crate::scene::{DetectorSignal, Estimator, PulseShape, RegionRadius};
 use wakescope_estimate::map::PolarPoint;
 
 /// Fields of a map of estimates.
@@ -127,7 +127,22 @@ fn bound_samples(plan: &Plan) -> f64 {
 /// Memory of the matrices of the bound of a record, bytes: the signal, the covariance and its
 /// derivative, its factor, a transposed copy.
 pub(crate) fn bound_bytes(plan: &Plan) -> f64 {
-    6.0 * 8.0 * bound_samples(plan).powi(2)
+    6.0 * 8.0 * bound_rows(plan).powi(2)
+}
+
+/// Rows of these matrices: those of complex samples of a pulse with phase hold real and imaginary parts.
+fn bound_rows(plan: &Plan) -> f64 {
+    let scene = plan.scene();
+    let has_phase = match &scene.pulse.shape {
+        PulseShape::Sampled(shape) => !shape.phase_rad.is_empty(),
+        PulseShape::Gaussian(_) => false,
+    };
+    let is_complex = scene.detector.signal == DetectorSignal::Baseband;
+    if has_phase && is_complex {
+        2.0 * bound_samples(plan)
+    } else {
+        bound_samples(plan)
+    }
 }
 
 /// What is prepared once, tapers from a covariance and weights of the lags: memory of the result,
@@ -159,7 +174,11 @@ fn estimates_s(plan: &Plan) -> f64 {
     let point_s = lines_per_region(plan) * numbers * 5e-9 + spectrum_s;
     let points_s = n.cells * n.realisations * point_s;
     let bounded = match e.radius {
-        RegionRadius::Target { .. } => bound_samples(plan).powi(3),
+        // Once for each gate.
+        RegionRadius::Target { .. } => {
+            let gates = plan.geometry.gate_range_m.len() as f64;
+            gates / 17.0 * bound_rows(plan).powi(3)
+        }
         _ => 0.0,
     };
     let planned_s = 4e-8 * (method.covariances() * window.powi(3) + bounded);

@@ -9,7 +9,7 @@
 //! | [`error_law`], [`cell_average`] | the law of these errors, averages of them over cells, their standard errors |
 //! | [`recorded`] | the same from the records of a file, measured or simulated |
 //! | [`mod@bound`] | the Cramer-Rao bound for a scene |
-//! | [`budget`] | the power budget, from the pulse to the signal-to-noise ratio |
+//! | [`budget`], `clipping` | the power budget, from the pulse to the signal-to-noise ratio; samples that the converter clips |
 //! | `efficiency_model` | the cheapest model of the efficiency that is valid, and the ranges at which it is computed |
 //! | `region`, `ray_information` | radius of regions; information of a pulse on the velocity about a range |
 //! | `response`, `plane` | what the estimators show of a wake; the wind on a cross-plane |
@@ -18,6 +18,7 @@ pub(crate) mod accumulation;
 pub mod bound;
 pub mod budget;
 pub mod cell_average;
+pub(crate) mod clipping;
 pub(crate) mod efficiency_model;
 pub mod error_law;
 pub(crate) mod gate_estimates;

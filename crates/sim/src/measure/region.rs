@@ -1,13 +1,17 @@
 //! The radius of the regions of a scene, and the wind of a first map between its points.
 //!
-//! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
+//! Check: tables keep their values; a target standard deviation is reached at each gate and not with a smaller radius.
 
 use crate::Error;
-use crate::interpolation::interpolate;
 use crate::measure::ray_information::RayInformation;
 use crate::plan::geometry::Geometry;
 use crate::scene::{RegionRadius, Scene};
-use wakescope_estimate::{Radius, map::ScanGeometry};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use wakescope_estimate::{
+    Radius,
+    map::{PolarPoint, ScanGeometry},
+};
 
 /// Where the windows of a scan are: in one plane if it is a plain RHI, else on a sphere.
 ///
@@ -42,6 +46,57 @@ pub(crate) fn places(scene: &Scene, g: &Geometry) -> Result<ScanGeometry, Error>
     )?)
 }
 
+/// Information on the velocity in regions of a scan about the line in its middle.
+///
+/// Each record is about its innermost window, with which rows of windows begin: ends of the scan cut chords. Most chords share one.
+pub(crate) struct RegionInformation<'a> {
+    of_rays: &'a RayInformation<'a>,
+    places: &'a ScanGeometry,
+    gates_m: Vec<f64>,
+    /// Windows of the longest chord.
+    most: usize,
+    /// Information in 1, 2, .. windows about the gates where it was needed.
+    by_gates: BTreeMap<usize, Vec<f64>>,
+}
+
+impl<'a> RegionInformation<'a> {
+    /// For regions up to a radius, m.
+    pub(crate) fn new(
+        of_rays: &'a RayInformation<'a>,
+        places: &'a ScanGeometry,
+        largest_m: f64,
+    ) -> Self {
+        Self {
+            of_rays,
+            places,
+            gates_m: places.gate_ranges_m(),
+            most: places.most_gates(largest_m),
+            by_gates: BTreeMap::new(),
+        }
+    }
+
+    /// Information, 1/(m/s)^2, in the region of a radius, m, about a range, m.
+    ///
+    /// # Errors
+    /// What the estimators refuse; a checked scene gives none.
+    pub(crate) fn about(&mut self, range_m: f64, radius_m: f64) -> Result<f64, Error> {
+        let point = PolarPoint::on_line(range_m, self.places.lines() / 2);
+        let mut of_region = 0.0;
+        for (line, gates) in self.places.chords(point, radius_m) {
+            let innermost = (gates.start + gates.end - 1) / 2;
+            let by_gates = match self.by_gates.entry(innermost) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(place) => {
+                    place.insert(self.of_rays.at(self.gates_m[innermost], self.most)?)
+                }
+            };
+            let pulses = self.places.line_rays(line).count();
+            of_region += pulses as f64 * by_gates[gates.len().min(self.most) - 1];
+        }
+        Ok(of_region)
+    }
+}
+
 /// The radius of a scene's regions.
 ///
 /// # Errors
@@ -61,39 +116,18 @@ pub(crate) fn region_radius(
             own.largest_radius_m(range_m)
         })));
     };
-    let all_m = geometry.gate_ranges_m();
-    let range_m: Vec<f64> = all_m
-        .iter()
-        .copied()
-        .step_by(all_m.len().div_ceil(16))
-        .collect();
-    let count = geometry.most_gates(largest_m);
-    let known = range_m
-        .iter()
-        .map(|at_m| of_rays.at(*at_m, count))
-        .collect::<Result<Vec<_>, Error>>()?;
-    let by_gates = |at_m: f64| -> Vec<f64> {
-        let of = |gates: usize| {
-            known
-                .iter()
-                .map(|by_gates| by_gates[gates])
-                .collect::<Vec<f64>>()
-        };
-        (0..count)
-            .map(|gates| interpolate(&range_m, &of(gates), at_m))
-            .collect()
-    };
-    Ok(Radius::for_standard_deviation(
-        geometry,
-        by_gates,
+    let mut information = RegionInformation::new(of_rays, geometry, largest_m);
+    Radius::for_standard_deviation(
+        &of_rays.plan.geometry.gate_range_m,
+        |range_m, radius_m| information.about(range_m, radius_m),
         standard_deviation_m_s,
         largest_m,
-    )?)
+    )
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::interpolation::interpolate;
 
     #[test]
     fn tables_are_linear_between_their_points() {

@@ -78,7 +78,7 @@ pub(crate) fn window_covariance(scene: &Scene, pulse: &Pulse) -> Result<WindowCo
     let e = &scene.estimator;
     let d = &scene.detector;
     let window = scene.weighting().weights(e.window_samples)?;
-    let correlation = scene.pulse_correlation(pulse);
+    let correlation = scene.real_pulse_correlation(pulse);
     // Half of a real signal and half of its noise are at the frequency of the peak.
     let band = d.bandwidth_hz / d.sampling_hz;
     Ok(WindowCovariance::new(
@@ -173,7 +173,7 @@ impl NoiseResponse {
         let mut lags = noise.expected_correlogram(&sampling, kind, 1.0, &vec![1.0; n])?;
         weigh(&mut lags, kind, lag_weights);
         let of_noise = estimator.estimate(&lags, &mut Scratch::new());
-        let pulse = scene.pulse_correlation(&instrument.pulse);
+        let pulse = scene.real_pulse_correlation(&instrument.pulse);
         let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
         let cells = n as f64 * scene.detector.bandwidth_hz / scene.detector.sampling_hz;
         let points = (8.0 * cells).ceil().clamp(65.0, 257.0) as usize;
@@ -249,7 +249,7 @@ impl ExpectedBias {
         let estimator = method.estimator(scene, kind, &lag_weights)?;
         let noise = noise.expected_correlogram(&sampling, kind, 1.0, &lag_weights)?;
         let mut signal = Vec::with_capacity(lag_weights.len());
-        for (weight, lag) in lag_weights.iter().zip(scene.pulse_correlation(pulse)) {
+        for (weight, lag) in lag_weights.iter().zip(scene.real_pulse_correlation(pulse)) {
             signal.push(weight * lag);
         }
         Ok(Some(Self {

@@ -190,11 +190,10 @@ pub fn receiver(scene: &Scene) -> signal::Receiver {
     }
 }
 
-/// What the receiver of a scene has beyond shot noise.
-fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
+/// The converter of a scene, if it has one, with the noise at its input.
+pub(crate) fn converter(scene: &Scene) -> Option<signal::receiver::Converter> {
     let d = &scene.detector;
-    let words = scene.detector.front_end.unwrap_or_default();
-    let converter = match d.digitiser {
+    match d.digitiser {
         Digitiser::None {} => None,
         Digitiser::Quantised {
             bits,
@@ -210,7 +209,13 @@ fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
                 (_, DetectorSignal::Baseband) => std::f64::consts::FRAC_1_SQRT_2,
             },
         }),
-    };
+    }
+}
+
+/// What the receiver of a scene has beyond shot noise.
+fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
+    let words = scene.detector.front_end.unwrap_or_default();
+    let converter = converter(scene);
     signal::receiver::FrontEnd {
         amplifier_noise_a_rthz: words.amplifier_noise_a_rthz,
         load_ohm: words.load_ohm,

@@ -105,7 +105,7 @@ keys! {
         "quantised" => Quantised {
             /// Bits of a sample.
             bits: u32 => 1..=32,
-            /// Full scale over the root mean square of the noise in the detector band, (13).
+            /// Full scale over the root mean square of all noise in the detector band.
             full_scale_over_noise: f64 => 1e-6..=1e12,
         },
     }

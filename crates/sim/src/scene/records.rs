@@ -131,18 +131,25 @@ impl Scene {
         }
     }
 
-    /// Real part of the autocorrelation of the pulse at the lags of a record, its mean frequency
-    /// removed; 1 at lag 0.
+    /// Real part of [`Scene::pulse_correlation`], which is all of it for a pulse with a symmetric
+    /// spectrum.
+    pub(crate) fn real_pulse_correlation(&self, pulse: &wakescope_signal::Pulse) -> Vec<f64> {
+        let correlation = self.pulse_correlation(pulse);
+        correlation.into_iter().map(|value| value.re).collect()
+    }
+
+    /// Autocorrelation of the pulse at the lags of a record, as signals have it: the sum of f(t + lag)
+    /// f*(t), its mean frequency removed; 1 at lag 0.
     ///
     /// `exp(-tau^2/(4 sigma^2))` for a Gaussian.
-    pub(crate) fn pulse_correlation(&self, pulse: &wakescope_signal::Pulse) -> Vec<f64> {
+    pub(crate) fn pulse_correlation(&self, pulse: &wakescope_signal::Pulse) -> Vec<Complex<f64>> {
         let count = self.samples_per_record();
         let period_s = 1.0 / self.detector.sampling_hz;
-        let mut correlation = vec![0.0; count];
+        let mut correlation = vec![Complex::new(0.0, 0.0); count];
         if self.pulse.is_gaussian() {
             for (m, value) in correlation.iter_mut().enumerate() {
                 let lag = m as f64 * period_s / pulse.sigma_s();
-                *value = (-0.25 * lag.powi(2)).exp();
+                *value = Complex::from((-0.25 * lag.powi(2)).exp());
             }
             return correlation;
         }
@@ -159,7 +166,7 @@ impl Scene {
             let carrier = Complex::from_polar(1.0, turn * time_s);
             envelope.push(pulse.envelope_per_sqrt_s(time_s) * carrier);
         }
-        let energy = lagged_product(&envelope, 0);
+        let energy = lagged_product(&envelope, 0).re;
         for (m, value) in correlation.iter_mut().enumerate() {
             if m * parts <= steps {
                 *value = lagged_product(&envelope, m * parts) / energy;
@@ -169,11 +176,11 @@ impl Scene {
     }
 }
 
-/// Real part of the sum of the products of samples `lag` apart.
-fn lagged_product(envelope: &[Complex<f64>], lag: usize) -> f64 {
-    let mut sum = 0.0;
+/// Sum of the products of samples `lag` apart, the earlier ones conjugate.
+fn lagged_product(envelope: &[Complex<f64>], lag: usize) -> Complex<f64> {
+    let mut sum = Complex::new(0.0, 0.0);
     for (late, early) in envelope[lag..].iter().zip(envelope) {
-        sum += (late * early.conj()).re;
+        sum += late * early.conj();
     }
     sum
 }

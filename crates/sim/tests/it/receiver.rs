@@ -104,17 +104,21 @@ fn a_map_has_the_ratio_of_the_scene_with_a_converter_of_few_bits() {
         10.0 * (ratios.iter().sum::<f64>() / ratios.len() as f64).log10()
     };
     // 3 gates of 5 lines and 120 pulses; the speckle of a gate and pulse has a relative deviation of 1.
-    for (snr_db, bits, full_scale, words) in [
-        (-3.0, 3, 8.0, ""),
-        (5.0, 3, 8.0, ""),
-        (-3.0, 3, 8.0, "noise = \"white\""),
+    for (snr_db, bits, full_scale, words, off_db) in [
+        (-3.0, 3, 8.0, "", 0.0),
+        (5.0, 3, 8.0, "", 0.0),
+        (-3.0, 3, 8.0, "noise = \"white\"", 0.0),
         // With a full scale of 8 a step is 2.8 deviations of a quadrature: the ratio is 3 dB too high, as the page says.
-        (-3.0, 3, 5.0, "signal = \"baseband\""),
+        (-3.0, 3, 5.0, "signal = \"baseband\"", 0.0),
+        // Clipping, by the table of the page.
+        (-3.0, 8, 1.0, "", -5.0),
+        (-3.0, 8, 2.0, "", -1.6),
+        (-3.0, 8, 3.0, "", -0.3),
     ] {
         let found_db = of_map(snr_db, bits, full_scale, words);
         assert!(
-            (found_db - snr_db).abs() < 0.35,
-            "{bits} bits, {words}: {found_db} {snr_db}"
+            (found_db - snr_db - off_db).abs() < 0.35,
+            "{bits} bits, {full_scale} x noise, {words}: {found_db} {snr_db}"
         );
     }
 }

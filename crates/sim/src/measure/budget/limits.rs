@@ -8,7 +8,6 @@ use crate::plan::described::sampled_velocities_m_s;
 use crate::scene::Weighting;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use wakescope_signal::RangeFilter;
-use wakescope_signal::constants::ELEMENTARY_CHARGE_C;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::receiver::phase_noise::{mean_frequency_sd_m_s, peak_variance_factor};
 
@@ -25,7 +24,6 @@ impl Budget {
         let instrument = &plan.instrument;
         let receiver = &instrument.receiver;
         let pulse = &instrument.pulse;
-        let d = &scene.detector;
         let mean_w = scene.pulse.energy_j * scene.laser.pulse_repetition_hz;
         let peak_w = instrument.peak_power_w();
         let power = format!("mean power {}, peak {}", si(mean_w, "W"), si(peak_w, "W"));
@@ -57,39 +55,45 @@ impl Budget {
         if scene.laser.linewidth_hz > 0.0 {
             self.phase_noise(plan)?;
         }
+        self.local_oscillator(plan);
+        self.resolution(plan)
+    }
+
+    /// Powers of the local oscillator at which noises are equal, and the best one.
+    fn local_oscillator(&mut self, plan: &Plan) {
+        let receiver = &plan.instrument.receiver;
         let n = receiver.noise_densities();
-        let mut oscillator = vec![format!(
-            "local oscillator {}",
-            si(d.local_oscillator_w, "W")
-        )];
+        let mut powers = Vec::new();
         if n.amplifier_a2_hz > 0.0 {
-            // Shot noise grows with the power, this noise does not.
-            let equal_w =
-                n.amplifier_a2_hz / (2.0 * ELEMENTARY_CHARGE_C * receiver.responsivity_a_w());
-            self.limits.push(("amplifier_equals_shot_w", equal_w));
-            oscillator.push(format!(
-                "amplifier noise equals shot noise at {}",
-                si(equal_w, "W")
-            ));
+            let equal_w = receiver.amplifier_equals_shot_w();
+            if equal_w.is_finite() {
+                self.limits.push(("amplifier_equals_shot_w", equal_w));
+                let equal = si(equal_w, "W");
+                powers.push(format!("amplifier noise equals shot noise at {equal}"));
+            } else {
+                powers.push("amplifier noise is above shot noise at any power".into());
+            }
         }
         if n.intensity_a2_hz > 0.0 {
-            let equal_w = d.local_oscillator_w * n.shot_a2_hz / n.intensity_a2_hz;
-            self.limits.push(("intensity_equals_shot_w", equal_w));
-            oscillator.push(format!("intensity noise equals it at {}", si(equal_w, "W")));
+            let equal_w = receiver.intensity_equals_shot_w();
+            if equal_w.is_finite() {
+                self.limits.push(("intensity_equals_shot_w", equal_w));
+                powers.push(format!("intensity noise equals it at {}", si(equal_w, "W")));
+            } else {
+                powers.push("intensity noise is below it at any power".into());
+            }
         }
         let best_w = receiver.best_local_oscillator_w();
         if best_w > 0.0 && best_w.is_finite() {
             self.limits.push(("best_local_oscillator_w", best_w));
-            oscillator.push(format!("best at {}", si(best_w, "W")));
+            powers.push(format!("best at {}", si(best_w, "W")));
         }
-        let (first, rest) = oscillator.split_at(1);
-        let rest = if rest.is_empty() {
-            "shot noise alone".into()
-        } else {
-            rest.join("; ")
-        };
-        self.limit_lines.push(format!("{}: {rest}", first.concat()));
-        self.resolution(plan)
+        if powers.is_empty() {
+            powers.push("shot noise alone".into());
+        }
+        let power = si(plan.scene().detector.local_oscillator_w, "W");
+        let line = format!("local oscillator {power}: {}", powers.join("; "));
+        self.limit_lines.push(line);
     }
 
     fn velocities(&mut self, plan: &Plan) {

@@ -653,6 +653,39 @@ mod tests {
         }
     }
 
+    /// Budget of a receiver with amplifier and intensity noise, and its line of the local oscillator.
+    fn saturating(local_oscillator_w: f64, saturation_w: f64) -> (Budget, String) {
+        let text = format!(
+            "[laser]\nwavelength_m = 2.05e-6\n[detector]\nquantum_efficiency = 0.7\nlocal_oscillator_w = {local_oscillator_w:?}\n\
+             [detector.front_end]\namplifier_noise_a_rthz = 10e-12\nload_ohm = 200.0\nload_temperature_k = 310.0\n\
+             intensity_noise_db_hz = -150.0\nrejection_db = 20.0\nsaturation_w = {saturation_w:?}\n"
+        );
+        let found = budget(&text, &[400.0]);
+        let mut lines = found.limit_lines.iter();
+        let line = lines.find(|line| line.starts_with("local oscillator"));
+        let line = line.unwrap().clone();
+        (found, line)
+    }
+
+    #[test]
+    fn noises_that_saturation_keeps_apart_equal_shot_noise_at_no_power() {
+        for local_oscillator_w in [2e-3, 1e-3] {
+            let (found, line) = saturating(local_oscillator_w, 5e-3);
+            assert!(line.contains("shot noise at 556 uW;"), "{line}");
+            assert!(
+                line.contains("intensity noise is below it at any power"),
+                "{line}"
+            );
+            let mut limits = found.limits.iter();
+            assert!(limits.all(|(name, _)| *name != "intensity_equals_shot_w"));
+        }
+        let (_, line) = saturating(2e-3, 4e-4);
+        assert!(
+            line.contains("amplifier noise is above shot noise at any power"),
+            "{line}"
+        );
+    }
+
     #[test]
     fn the_text_has_the_columns_and_limits_that_designers_know() {
         let text = budget(REAL, &[280.0, 400.0, 520.0]).text();

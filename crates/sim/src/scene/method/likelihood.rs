@@ -5,6 +5,7 @@ use crate::Error;
 use crate::keys::keys;
 use crate::scene::{Estimator, Scene};
 use ndarray::Array2;
+use num_complex::Complex;
 use wakescope_estimate::bound::{Noise, WindowModel};
 use wakescope_estimate::estimators::likelihood_tapers;
 use wakescope_estimate::spectrum::Taper;
@@ -27,9 +28,10 @@ impl EstimationMethod for Likelihood {
         let requested = self.likelihood_snr_db.map(|db| 10f64.powf(0.1 * db));
         let snr = requested.unwrap_or(snr).clamp(1e-8, 1e8);
         let n = scene.estimator.window_samples;
-        let correlation = scene.pulse_correlation(pulse);
+        // Tapers are real: those of the real part.
+        let correlation = scene.real_pulse_correlation(pulse);
         let envelope = Array2::from_shape_fn((n, n), |(a, b)| {
-            correlation.get(a.abs_diff(b)).copied().unwrap_or(0.0)
+            Complex::from(correlation.get(a.abs_diff(b)).copied().unwrap_or(0.0))
         });
         // The tapers are those of white noise and need no inverse, whatever the noise.
         let model = WindowModel::with_envelope(&scene.sampling()?, envelope, Noise::White)?;
