@@ -13,6 +13,7 @@ use crate::retrieval::scan_turbulence::{Remainder, gate_covariance, gate_positio
 use crate::retrieval::whitening::Whitening;
 use crate::retrieval::{
     Flag, Movement, RetrievalOptions, ScanMap, ScanResult, ScanTurbulence, Turbulence,
+    without_spikes,
 };
 use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::map_fit::gates::Gates;
@@ -44,7 +45,7 @@ const DOUBTS: [Flag; 4] = [
 pub(super) fn fit_means(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
     options.validate()?;
     map.validate()?;
-    let found = fit_in_winds(map, options)?;
+    let found = fit_among_outliers(map, options)?;
     let is_clear = found.vortices.len() == 2 && !DOUBTS.iter().any(|flag| found.has(*flag));
     if is_clear || options.movement != Movement::Auto || map.lasts_s() == 0.0 {
         return Ok(found);
@@ -58,6 +59,27 @@ pub(super) fn fit_means(map: &ScanMap, options: &RetrievalOptions) -> Result<Sca
     let least = found.statistic + RetrievalOptions::MOVES;
     let is_better = standing.wake.is_some() && standing.statistic > least;
     Ok(if is_better { standing } else { found })
+}
+
+/// The result of a scan; of one with many outliers, which mislead the search, also from the wake that it shows without them.
+fn fit_among_outliers(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
+    let found = fit_in_winds(map, options)?;
+    if !found.has(Flag::Outliers) {
+        return Ok(found);
+    }
+    let (clean, _) = without_spikes(map, options.turbulence.as_ref());
+    // Too few velocities may be left.
+    let in_clean = fit_in_winds(&clean, options).ok();
+    let Some(wake) = in_clean.and_then(|result| result.wake) else {
+        return Ok(found);
+    };
+    let from_there = RetrievalOptions {
+        start: Some(wake),
+        ..options.clone()
+    };
+    let again = fit_in_winds(map, &from_there)?;
+    let is_better = again.statistic > found.statistic;
+    Ok(if is_better { again } else { found })
 }
 
 /// The result in the wind, among those that folded velocities leave open, that explains the velocities best.

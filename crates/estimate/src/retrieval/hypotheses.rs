@@ -4,7 +4,7 @@
 
 use crate::error::Error;
 use crate::linalg::positive_definite::inverse;
-use crate::retrieval::{RetrievalOptions, ScanMap, Side, without_spikes};
+use crate::retrieval::{RetrievalOptions, ScanMap, Side};
 use crate::vortex_fit::levenberg_marquardt::{Minimum, StoppingRule};
 use crate::vortex_fit::map_fit::cells::{cells, products};
 use crate::vortex_fit::map_fit::gates::Gates;
@@ -26,8 +26,6 @@ const LONE_CORE_M: f64 = 2.0;
 const BROAD: f64 = 0.1;
 /// A core is not resolved if its deviation is more than this part of it, or if it is more than that part of the spacing.
 const RESOLVED: f64 = 0.5;
-/// Part of the velocities of a scan that are outliers, from which they mislead the search.
-const MANY_SPIKES: f64 = 0.02;
 const LARGEST: f64 = 0.5;
 
 /// Which vortices there are.
@@ -200,25 +198,16 @@ impl<'a> Stage<'a> {
         .collect()
     }
 
-    /// Where fits of a scan start. Among many outliers those of the scan without them are tried as well.
+    /// Where fits of a scan start.
     pub(crate) fn starts(&self) -> Result<Vec<(Kind, Wake)>, Error> {
-        let mut starts = Vec::new();
-        starts.extend(self.options.start.map(|wake| (Kind::Both, wake)));
-        starts.extend(self.starts_in(self.map)?);
-        let (clean, spikes) = without_spikes(self.map, self.options.turbulence.as_ref());
-        let cells = self.map.velocity_m_s.len();
-        if spikes as f64 > MANY_SPIKES * cells as f64 {
-            // Too few velocities may be left to search in.
-            starts.extend(self.starts_in(&clean).unwrap_or_default());
-        }
-        Ok(starts)
-    }
-
-    /// Where fits start that know a map alone.
-    fn starts_in(&self, map: &ScanMap) -> Result<Vec<(Kind, Wake)>, Error> {
-        let search = Search::new(&map.view(), self.gates.model, &self.gates.kernel)?;
-        let pairs = search.wakes().into_iter();
-        let mut starts: Vec<(Kind, Wake)> = pairs.map(|wake| (Kind::Both, wake)).collect();
+        let search = Search::new(&self.map.view(), self.gates.model, &self.gates.kernel)?;
+        let mut starts: Vec<_> = self
+            .options
+            .start
+            .into_iter()
+            .chain(search.wakes())
+            .map(|wake| (Kind::Both, wake))
+            .collect();
         for (kind, sense) in [(Kind::Left, -1.0), (Kind::Right, 1.0)] {
             let single = search.single(sense);
             starts.extend(single.map(|(place_m, circulation_m2_s)| {

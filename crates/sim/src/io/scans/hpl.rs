@@ -482,10 +482,10 @@ mod tests {
 
     #[test]
     fn a_date_that_is_not_understood_is_named_and_gives_no_times() {
-        let text = file(&[("20240131 23:59:00.00", "31.01.2024 23:59")]);
+        let text = file(&[("20240131 23:59:00.00", "01/31/2024 23:59")]);
         let found = scans(&text, Path::new("x.hpl"), &ScanFormat::default()).unwrap();
         assert!(
-            found.warnings[0].contains("31.01.2024 23:59"),
+            found.warnings[0].contains("01/31/2024 23:59"),
             "{:?}",
             found.warnings
         );
