@@ -10,7 +10,7 @@
 use crate::error::Error;
 use crate::retrieval::aliases::Unfolded;
 use crate::retrieval::estimates::fit_estimates;
-use crate::retrieval::gate_means::fit_means;
+use crate::retrieval::gate_means::{fit_among_outliers, fit_means};
 use crate::retrieval::secondary::with_secondary_vortices;
 use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, Turbulence, Velocities};
 use crate::vortex_fit::Sharing;
@@ -52,6 +52,7 @@ pub fn fit_scan(
     };
     rough.free.core_radius = Sharing::Fixed;
     let found = fit_means(independent, &rough)?;
+    let found = fit_among_outliers(independent, &rough, found)?;
     // Guesses and starts do not know that velocities repeat.
     let unfolded = match &found.wake {
         Some(wake) => strided.unfolded_about(&options.model, wake),
@@ -78,7 +79,11 @@ fn fit_as_means(
     are_means: bool,
 ) -> Result<ScanResult, Error> {
     let pair = fit_means(map, options)?;
-    let mut fit = with_secondary_vortices(map, options, &pair)?.unwrap_or(pair);
+    // Secondary vortices may be what looks like outliers.
+    let mut fit = match with_secondary_vortices(map, options, &pair)? {
+        Some(four) => four,
+        None => fit_among_outliers(map, options, pair)?,
+    };
     if !are_means {
         flag_taken_for_means(&mut fit);
     }

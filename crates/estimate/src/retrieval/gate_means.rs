@@ -33,8 +33,8 @@ const NOTHING: f64 = 0.5;
 /// What may be wrong with a pair that moves in the fit and not in the scan.
 const DOUBTS: [Flag; 4] = [
     Flag::CoreKept,
-    Flag::Ambiguous,
     Flag::PoorFit,
+    Flag::Ambiguous,
     Flag::NotConverged,
 ];
 
@@ -45,7 +45,7 @@ const DOUBTS: [Flag; 4] = [
 pub(super) fn fit_means(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
     options.validate()?;
     map.validate()?;
-    let found = fit_among_outliers(map, options)?;
+    let found = fit_in_winds(map, options)?;
     let is_clear = found.vortices.len() == 2 && !DOUBTS.iter().any(|flag| found.has(*flag));
     if is_clear || options.movement != Movement::Auto || map.lasts_s() == 0.0 {
         return Ok(found);
@@ -61,15 +61,22 @@ pub(super) fn fit_means(map: &ScanMap, options: &RetrievalOptions) -> Result<Sca
     Ok(if is_better { standing } else { found })
 }
 
-/// The result of a scan; of one with many outliers, which mislead the search, also from the wake that it shows without them.
-fn fit_among_outliers(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
-    let found = fit_in_winds(map, options)?;
+/// What was `found` in a scan; where that leaves many outliers, which mislead the search, the fit from the wake that the scan shows without them, if it
+/// explains more.
+///
+/// # Errors
+/// As [`fit_scan`](crate::retrieval::fit_scan).
+pub(super) fn fit_among_outliers(
+    map: &ScanMap,
+    options: &RetrievalOptions,
+    found: ScanResult,
+) -> Result<ScanResult, Error> {
     if !found.has(Flag::Outliers) {
         return Ok(found);
     }
     let (clean, _) = without_spikes(map, options.turbulence.as_ref());
     // Too few velocities may be left.
-    let in_clean = fit_in_winds(&clean, options).ok();
+    let in_clean = fit_means(&clean, options).ok();
     let Some(wake) = in_clean.and_then(|result| result.wake) else {
         return Ok(found);
     };
@@ -77,7 +84,7 @@ fn fit_among_outliers(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanR
         start: Some(wake),
         ..options.clone()
     };
-    let again = fit_in_winds(map, &from_there)?;
+    let again = fit_means(map, &from_there)?;
     let is_better = again.statistic > found.statistic;
     Ok(if is_better { again } else { found })
 }

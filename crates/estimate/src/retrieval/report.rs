@@ -17,9 +17,10 @@ use crate::vortex_fit::{Parameter, Top, Wake};
 pub(crate) const OUTLIER: f64 = 4.0;
 /// So many times the root of the threshold is far beyond doubt in correlated noise too.
 const BY_FAR: f64 = 2.0;
-/// Most that one velocity may say for a vortex, in parts of the threshold: a loss of outliers lets one bad velocity exceed it alone, which a narrow
-/// pair or a small core then explains.
+/// Most that each of a few velocities may say for a vortex, in parts of the threshold: a loss of outliers lets one bad velocity exceed it alone, which
+/// a narrow pair or a small core then explains.
 const OF_ONE: f64 = 0.2;
+const FEW: usize = 4;
 /// A side of a vortex is seen if the sector reaches so far beyond its centre \[m\], where circulation begins to be counted.
 const SEEN_M: f64 = 5.0;
 /// Chi-square per degree after robust scaling that is too much, and part of outliers that is.
@@ -96,26 +97,31 @@ impl<'a> Report<'a> {
         })
     }
 
-    /// Drop of chi-square from one fit to another one with more vortices, with correlated velocities counted once; infinite without the first. A
-    /// drop that no velocity alone may decide is counted with at most [`OF_ONE`] of the threshold from each.
+    /// Drop of chi-square from one fit to another one with more vortices, with correlated velocities counted once; infinite without the first. Of
+    /// the [`FEW`] velocities that say most for it each counts at most [`OF_ONE`] of the threshold.
     fn gain(&self, without: Option<&End>, with: &End, alike: f64) -> f64 {
         let Some(without) = without else {
             return f64::INFINITY;
         };
         let variance = self.scale.powi(2);
-        let threshold = self.stage.options.threshold;
         let of_all = (without.chi2 - with.chi2) / variance / alike;
+        let threshold = self.stage.options.threshold;
         if of_all < threshold {
             return of_all;
         }
         let squares = &self.stage.squares;
         let before = squares.rows(&without.wake.to_array(), &[]).residuals;
         let after = squares.rows(&with.wake.to_array(), &[]).residuals;
-        let mut of_several = 0.0;
+        let mut drops = Vec::with_capacity(before.len());
         for (before, after) in before.iter().zip(&after) {
-            let drop = 2.0 * (squares.loss.at(*before).0 - squares.loss.at(*after).0);
-            of_several += (drop / variance).min(OF_ONE * threshold) / alike;
+            drops.push(2.0 * (squares.loss.at(*before).0 - squares.loss.at(*after).0) / variance);
         }
+        drops.sort_by(|a, b| b.total_cmp(a));
+        let mut too_much = 0.0;
+        for drop in drops.iter().take(FEW) {
+            too_much += (drop - OF_ONE * threshold).max(0.0);
+        }
+        let of_several = of_all - too_much / alike;
         if of_several < threshold {
             of_several
         } else {
