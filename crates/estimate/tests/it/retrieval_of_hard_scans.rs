@@ -500,3 +500,40 @@ fn vortices_that_stand_in_scans_of_a_minute_are_taken_for_such() {
         }
     }
 }
+
+/// Gates longer than the pair is wide, behind a short pulse: a Gaussian of the same variance shows other vortices.
+#[test]
+fn long_rectangular_gates_are_no_gaussians() {
+    let wake = Wake::from_array(&[400.0, 400.0, 400.0, 45.0, 440.0, 45.0, 3.0, 3.0, 2.0, 0.0]);
+    let kernel = RangeKernel::rectangular_gate(3.2, 50.0, 1.5625).unwrap();
+    let of_gate = |gate: Gate| RetrievalOptions {
+        gate,
+        core_prior: Some(CorePrior::TYPICAL),
+        ..Default::default()
+    };
+    let of_rectangle = of_gate(Gate::Kernel(kernel));
+    let of_gaussian = of_gate(Gate::Gaussian {
+        std_m: of_rectangle.gate.std_m(),
+    });
+    let lines = (2f64.to_radians(), 0.4f64.to_radians(), 31);
+    let mut map = noisy(&wake, &of_gate(Gate::Point), lines, (260.0, 20.0, 18), 1);
+    map.velocity_m_s = expected_velocities(&map, &of_rectangle, &wake, false).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(4000);
+    for velocity in &mut map.velocity_m_s {
+        *velocity += 0.3 * normal(&mut rng);
+    }
+    map.sigma_m_s = None;
+    let right = fit_scan(&map, Velocities::Means, &of_rectangle).unwrap();
+    for vortex in &right.vortices {
+        let Measured { value, std } = vortex.circulation_m2_s;
+        assert!(
+            (value - 400.0).abs() < 3.0 * std && std < 20.0,
+            "{vortex:?}"
+        );
+    }
+    let wrong = fit_scan(&map, Velocities::Means, &of_gaussian).unwrap();
+    for vortex in &wrong.vortices {
+        assert!(vortex.circulation_m2_s.value < 375.0, "{vortex:?}");
+    }
+    assert_eq!(right.vortices.len() + wrong.vortices.len(), 4);
+}
