@@ -19,7 +19,7 @@ use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::SEARCHED;
 use crate::vortex_fit::tolerances::MINIMUM;
-use crate::vortex_fit::{Loss, Wake};
+use crate::vortex_fit::{Loss, Sharing, Wake};
 use crate::wind_profile::GatePosition;
 
 /// Most velocities that are whitened, and that are fitted: blocks stand for more.
@@ -38,6 +38,9 @@ const DOUBTS: [Flag; 4] = [
     Flag::NotConverged,
 ];
 
+/// Places of vortices that one fit does not tell apart from those of another \[m\].
+const SAME_PLACE_M: f64 = 3.0;
+
 /// Finds the vortices of a scan whose velocities are means over gates.
 ///
 /// # Errors
@@ -46,7 +49,7 @@ pub(super) fn fit_means(map: &ScanMap, options: &RetrievalOptions) -> Result<Sca
     options.validate()?;
     map.validate()?;
     let found = fit_in_winds(map, options)?;
-    let is_clear = found.vortices.len() == 2 && !DOUBTS.iter().any(|flag| found.has(*flag));
+    let is_clear = found.vortices.len() == 2 && !is_doubtful(&found, options);
     if is_clear || options.movement != Movement::Auto || map.lasts_s() == 0.0 {
         return Ok(found);
     }
@@ -59,6 +62,14 @@ pub(super) fn fit_means(map: &ScanMap, options: &RetrievalOptions) -> Result<Sca
     let least = found.statistic + RetrievalOptions::MOVES;
     let is_better = standing.wake.is_some() && standing.statistic > least;
     Ok(if is_better { standing } else { found })
+}
+
+/// Whether a pair may be at rest though the fit lets it move. Cores that are fixed say nothing of that.
+fn is_doubtful(found: &ScanResult, options: &RetrievalOptions) -> bool {
+    let are_cores_free = options.free.core_radius != Sharing::Fixed;
+    DOUBTS
+        .iter()
+        .any(|flag| found.has(*flag) && (are_cores_free || *flag != Flag::CoreKept))
 }
 
 /// What was `found` in a scan; where that leaves many outliers, which mislead the search, the fit from the wake that the scan shows without them, if it
@@ -75,18 +86,30 @@ pub(super) fn fit_among_outliers(
         return Ok(found);
     }
     let (clean, _) = without_spikes(map, options.turbulence.as_ref());
+    let mut options = options.clone();
+    if found.has(Flag::MotionIgnored) {
+        options.movement = Movement::Frozen;
+    }
     // Too few velocities may be left.
-    let in_clean = fit_means(&clean, options).ok();
+    let in_clean = fit_in_winds(&clean, &options).ok();
     let Some(wake) = in_clean.and_then(|result| result.wake) else {
         return Ok(found);
     };
-    let from_there = RetrievalOptions {
-        start: Some(wake),
-        ..options.clone()
-    };
-    let again = fit_means(map, &from_there)?;
-    let is_better = again.statistic > found.statistic;
+    if found.wake.is_some_and(|found| are_same(&found, &wake)) {
+        return Ok(found);
+    }
+    options.start = Some(wake);
+    let again = fit_in_winds(map, &options)?;
+    let is_better =
+        again.wake.is_some() && (found.wake.is_none() || again.statistic > found.statistic);
     Ok(if is_better { again } else { found })
+}
+
+/// Whether the vortices of two wakes are at the same places, so that one start leads to both.
+fn are_same(a: &Wake, b: &Wake) -> bool {
+    let left_m = a.left.away_m(b.left.place_m());
+    let right_m = a.right.away_m(b.right.place_m());
+    left_m.max(right_m) < SAME_PLACE_M
 }
 
 /// The result in the wind, among those that folded velocities leave open, that explains the velocities best.

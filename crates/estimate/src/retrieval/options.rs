@@ -47,9 +47,7 @@ impl Gate {
 
     /// Refuses a weight that is wider than the scan: it shows nothing of a wake, and has more points than any memory.
     pub(crate) fn validate(&self, range_m: &[f64]) -> Result<(), Error> {
-        let Self::Gaussian { std_m } = *self else {
-            return Ok(());
-        };
+        let std_m = self.std_m();
         not_negative("std_m of the gate", std_m)?;
         let length_m = range_m
             .last()

@@ -182,7 +182,7 @@ pub(crate) const AZIMUTH: VariableNames = VariableNames {
     ],
 };
 pub(crate) const TIME: VariableNames = VariableNames {
-    names: "time timestamp datetime date_time time_utc utc_time unix_time decimal_time decimal_hours hours",
+    names: "time timestamp datetime date_time time_utc utc_time unix_time decimal_time decimal_hours",
     standard_names: &["time"],
 };
 /// Nyquist velocities: half the interval after which velocities repeat.
@@ -253,7 +253,7 @@ fn is_column(column: &str, name: &str) -> bool {
 }
 
 /// Names of times that are hours where they state no unit.
-const HOURS: [&str; 3] = ["decimal_time", "decimal_hours", "hours"];
+const HOURS: [&str; 2] = ["decimal_time", "decimal_hours"];
 
 /// The unit of a variable: its attribute, what its name ends with, or what its name says.
 fn units<'s>(source: &'s dyn VariableSource, name: &'s str) -> Option<&'s str> {
@@ -712,10 +712,17 @@ fn plain_unit_s(numbers: &[f64]) -> f64 {
     1.0
 }
 
-/// Whether all numbers have no more digits than 32 bits hold, as those of a program that stored them so before.
+/// Whether all numbers have no more digits than 32 bits hold, and some have as many, as those of a program that stored them so before.
 fn have_32_bits(numbers: &[f64]) -> bool {
-    let mut known = numbers.iter().filter(|number| number.is_finite());
-    known.all(|number| f64::from(*number as f32) == *number)
+    let mut uses_last_bit = false;
+    for number in numbers.iter().filter(|number| number.is_finite()) {
+        let single = *number as f32;
+        if f64::from(single) != *number {
+            return false;
+        }
+        uses_last_bit |= single.to_bits() & 1 == 1;
+    }
+    uses_last_bit
 }
 
 /// That numbers of 32 bits in units of `unit_s` are rounded too far, in words.

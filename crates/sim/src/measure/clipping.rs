@@ -80,7 +80,11 @@ fn strongest(plan: &Plan) -> Result<[f64; 2], Error> {
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         return Ok([first_m, 10f64.powf(0.1 * snr_db)]);
     }
-    let mut range_m = linspace(first_m, last_m, POINTS);
+    // The signal changes by factors of the range.
+    let mut range_m = linspace(first_m.ln(), last_m.ln(), POINTS);
+    for at_m in &mut range_m {
+        *at_m = at_m.exp().clamp(first_m, last_m);
+    }
     range_m.dedup();
     let efficiency = efficiency_by_theory(&plan.instrument, &range_m)?;
     if let Some(profile) = &scene.atmosphere.profile {

@@ -77,7 +77,7 @@ fn of_std(std_m: f64) -> Gate {
 
 /// A gate of that length behind a pulse.
 fn rectangle(pulse_std_m: f64, length_m: f64) -> Result<Gate, Error> {
-    let spacing_m = SPACING_M.max(length_m / POINTS);
+    let spacing_m = SPACING_M.max(length_m.max(WIDTH_OVER_STD * pulse_std_m) / POINTS);
     let kernel = RangeKernel::rectangular_gate(pulse_std_m, length_m, spacing_m)?;
     Ok(Gate::Kernel(kernel))
 }
@@ -128,8 +128,7 @@ pub fn options(scene: Option<&Scene>, gate: Gate, core_radius_m: Option<f64>) ->
     let pair = scene.and_then(|scene| scene.flow.pair());
     let profile = pair.map(|pair| pair.profile);
     // Long gates do not show cores: without what is known of them they run away with the circulation.
-    let is_short = matches!(&gate, Gate::Point)
-        || matches!(&gate, Gate::Gaussian { std_m } if *std_m <= LONG_GATE_M);
+    let is_short = gate.std_m() <= LONG_GATE_M;
     let lidar_height_m = scene.map_or(0.0, |scene| scene.scan.lidar_height_m);
     let wanted = scene.and_then(|scene| scene.retrieval.as_ref());
     let mut options = RetrievalOptions {

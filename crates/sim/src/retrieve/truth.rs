@@ -265,9 +265,13 @@ fn strongest(plan: &Plan, first: usize, time_s: f64, sense: f64) -> Result<(f64,
         .iter()
         .fold(0.0_f64, |top, e| top.max(*e))
         .min(std::f64::consts::FRAC_PI_2);
+    let steepest = g
+        .elevation_rad
+        .iter()
+        .fold(top, |most, e| most.max(e.abs()));
     let beam = g.schedule.middle(first);
     let ahead = g.schedule.ahead(&beam);
-    let [near_m, far_m] = [scan.range_min_m * top.cos(), scan.range_max_m]
+    let [near_m, far_m] = [scan.range_min_m * steepest.cos(), scan.range_max_m]
         .map(|range_m| ahead.at_range_m(beam.position_m, range_m)[1]);
     let sector = (
         (near_m.min(far_m), COARSE_M),

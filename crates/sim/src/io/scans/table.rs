@@ -313,7 +313,10 @@ impl<'t> Columns<'t> {
                 let (rays, range_m) = grid(velocities, true).map_err(|reason| reason + &remark)?;
                 (planes::in_time(rays), range_m)
             }
-            Err(reason) => return Err(reason + &self.time_remark()),
+            Err(reason) if reason.contains("is there twice") => {
+                return Err(reason + &self.time_remark());
+            }
+            Err(reason) => return Err(reason),
         };
         let split = split.map_err(|reason| format!("{what}: {reason}"))?;
         Ok((split, range_m))

@@ -80,7 +80,7 @@ impl Budget {
                 self.limits.push(("intensity_equals_shot_w", equal_w));
                 powers.push(format!("intensity noise equals it at {}", si(equal_w, "W")));
             } else {
-                powers.push("intensity noise is below it at any power".into());
+                powers.push("intensity noise is below shot noise at any power".into());
             }
         }
         let best_w = receiver.best_local_oscillator_w();

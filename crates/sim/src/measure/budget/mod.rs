@@ -673,7 +673,7 @@ mod tests {
             let (found, line) = saturating(local_oscillator_w, 5e-3);
             assert!(line.contains("shot noise at 556 uW;"), "{line}");
             assert!(
-                line.contains("intensity noise is below it at any power"),
+                line.contains("intensity noise is below shot noise at any power"),
                 "{line}"
             );
             let mut limits = found.limits.iter();
