@@ -30,8 +30,8 @@ struct Running {
     steps: u64,
     done: u64,
     text: String,
-    /// When was told of it last.
-    told: Option<Instant>,
+    /// When it was reported last.
+    reported: Option<Instant>,
 }
 
 /// Sends what it is told, and stops the command that tells it when this is wanted.
@@ -70,7 +70,7 @@ impl Teller {
         let Some(first) = running.first_mut() else {
             return;
         };
-        if seldom && first.told.is_some_and(|told| told.elapsed() < SELDOM) {
+        if seldom && first.reported.is_some_and(|reported| reported.elapsed() < SELDOM) {
             return;
         }
         let part = if first.steps == 0 {
@@ -83,7 +83,7 @@ impl Teller {
             part,
             text: first.text.clone(),
         });
-        first.told = Some(Instant::now());
+        first.reported = Some(Instant::now());
     }
 }
 
@@ -95,7 +95,7 @@ impl Observer for Teller {
                 steps,
                 done: 0,
                 text: String::new(),
-                told: None,
+                reported: None,
             })
         });
     }

@@ -403,7 +403,7 @@ fn the_profile_of_the_cores_is_part_of_the_deviations_unless_it_is_stated() {
     assert!(open > 0.4 && open < 1.5 && stated > 1.8, "{open} {stated}");
 }
 
-/// A scan of coarse gates with noise of 0.5 m/s, in which so many of the velocities are bad.
+/// A scan of coarse gates with noise of 0.5 m/s, of which a fraction `bad` of the velocities is uniform within 20 m/s.
 fn with_bad_velocities(wake: &Wake, bad: f64, seed: u64) -> (ScanMap, RetrievalOptions) {
     let options = RetrievalOptions {
         gate: Gate::Gaussian { std_m: 3.46 },

@@ -121,7 +121,7 @@ fn refuse_other_planes(scene: &SceneFile) -> Result<(), Error> {
     let reason = "retrieve and detect need data sets of scan.pattern.kind = \"rhi\" in the plane across the flight, towards +y, with a lidar \
                   at rest at y_m = 0.0; other methods may read this one";
     Err(Error::Key {
-        key: "scan.lidar",
+        key: "scan",
         reason: reason.into(),
     })
 }

@@ -538,7 +538,9 @@ fn warn_of_sign(
     }
     let cure = match args.scans.velocities.towards {
         true => "are they positive away from the lidar? Then omit --towards",
-        false => "are they positive towards the lidar? Then give --towards",
+        false => {
+            "are they positive towards the lidar? Then give --towards, or correct the direction that the file states"
+        }
     };
     let path = scan.path.display();
     observer.warn(&format!(

@@ -20,9 +20,9 @@ use wakescope_estimate::vortex_fit::{CorePrior, RangeKernel, Sharing, WakeModel}
 /// Standard deviation of the weight of gates that do not show cores, m.
 const LONG_GATE_M: f64 = 3.0;
 
-/// Distance of the points of the weight along the line, m, or points in a long gate.
+/// Distance of the points of the weight along the line, m; between a least and a largest number of them in a gate of a file.
 const SPACING_M: f64 = 1.25;
-const POINTS: f64 = 32.0;
+const POINTS: (f64, f64) = (8.0, 32.0);
 /// Root of 8 ln 2: width at half height of a Gaussian over its standard deviation.
 pub(crate) const WIDTH_OVER_STD: f64 = 2.354_820_045_030_949_4;
 
@@ -56,6 +56,8 @@ pub fn gate_of_instrument(
     stated_m: Option<f64>,
     scene: Option<&Scene>,
 ) -> Result<(Gate, Option<&'static str>), Error> {
+    // Some files state 0 where they know no length.
+    let gate_length_m = gate_length_m.filter(|length_m| *length_m > 0.0);
     let pulse_m = pulse_width_s.map(|width_s| 0.5 * SPEED_OF_LIGHT_M_S * width_s / WIDTH_OVER_STD);
     Ok(match (stated_m, scene, pulse_m, gate_length_m) {
         (Some(std_m), ..) => (of_std(std_m), None),
@@ -77,7 +79,8 @@ fn of_std(std_m: f64) -> Gate {
 
 /// A gate of that length behind a pulse.
 fn rectangle(pulse_std_m: f64, length_m: f64) -> Result<Gate, Error> {
-    let spacing_m = SPACING_M.max(length_m.max(WIDTH_OVER_STD * pulse_std_m) / POINTS);
+    let whole_m = length_m.max(WIDTH_OVER_STD * pulse_std_m);
+    let spacing_m = SPACING_M.clamp(whole_m / POINTS.1, whole_m / POINTS.0);
     let kernel = RangeKernel::rectangular_gate(pulse_std_m, length_m, spacing_m)?;
     Ok(Gate::Kernel(kernel))
 }
@@ -197,8 +200,8 @@ mod tests {
         };
         let mut scan = ReadScan::new(Path::new(""), 0, map);
         let std_m = |scan: &ReadScan, stated| {
-            let (gate, told) = gate_of(Some(scan), stated, None).unwrap();
-            (gate.std_m(), told.is_some())
+            let (gate, remark) = gate_of(Some(scan), stated, None).unwrap();
+            (gate.std_m(), remark.is_some())
         };
         assert_eq!(std_m(&scan, None), (0.0, true));
         assert_eq!(
@@ -206,8 +209,15 @@ mod tests {
             ((0.0, false), (14.4, false))
         );
         scan.gate_length_m = Some(30.0);
-        let (of_rectangle_m, told) = std_m(&scan, None);
-        assert!((of_rectangle_m - 30.0 / 12f64.sqrt()).abs() < 0.05 && told);
+        let (of_rectangle_m, has_remark) = std_m(&scan, None);
+        assert!((of_rectangle_m - 30.0 / 12f64.sqrt()).abs() < 0.05 && has_remark);
+        scan.gate_length_m = Some(3.0);
+        let (of_short_m, _) = std_m(&scan, None);
+        assert!(
+            (of_short_m - 3.0 / 12f64.sqrt()).abs() < 0.02,
+            "{of_short_m}"
+        );
+        scan.gate_length_m = Some(30.0);
         scan.pulse_width_s = Some(200e-9);
         // 200 ns at half height are 12.73 m of standard deviation.
         assert!((std_m(&scan, None).0 - 12.73f64.hypot(8.66)).abs() < 0.03);

@@ -80,7 +80,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Foun
     }
     found.warnings.extend(columns.times.not_understood);
     if let Some(text) = columns.times.rounded {
-        // Before, they may have told scans apart.
+        // They have split the scans, which is all that they are good for.
         for scan in &mut found.scans {
             scan.map.time_s.fill(f64::NAN);
         }

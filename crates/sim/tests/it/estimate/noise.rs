@@ -20,14 +20,19 @@ fn largest_difference_m_s(folder: &Path, maps: [&str; 2]) -> f64 {
     differences.fold(0.0, f64::max)
 }
 
+/// The largest current by size, A.
+fn largest(currents: &[f64]) -> f64 {
+    currents
+        .iter()
+        .fold(0.0, |most, current| most.max(current.abs()))
+}
+
 #[test]
 fn the_zero_of_a_converter_moves_no_velocity() {
     let temp = recorded_run("");
     let folder = temp.path();
     let (currents, _) = samples(&folder.join("o/signals.nc"));
-    let largest = currents
-        .iter()
-        .fold(0.0_f64, |most, one| most.max(one.abs()));
+    let largest = largest(&currents);
     let code = |zero: f64| {
         let codes = currents
             .iter()
@@ -249,9 +254,7 @@ fn counts_stored_as_floats_are_those_of_integers_and_missing_samples_are_counted
     let temp = recorded_run("");
     let folder = temp.path();
     let (currents, _) = samples(&folder.join("o/signals.nc"));
-    let largest = currents
-        .iter()
-        .fold(0.0_f64, |most, one| most.max(one.abs()));
+    let largest = largest(&currents);
     let mut counts: Vec<i16> = currents
         .iter()
         .map(|one| (one / largest * 20_000.0).round() as i16)
