@@ -70,7 +70,9 @@ fn scan() -> (ScanMap, Wake) {
         sigma_m_s: Some(Array2::from_elem((50, 11), NOISE_M_S)),
         fold_m_s: None,
     };
-    let wake = Wake::from_array(&[400.0, 400.0, 376.5, 60.0, 423.5, 60.0, 2.1, 2.1, 2.0, 0.0]);
+    let wake = Wake::from_array(&[
+        400.0, 400.0, 376.5, 60.0, 423.5, 60.0, 2.1, 2.1, 2.0, 0.0, 0.0,
+    ]);
     (map, wake)
 }
 

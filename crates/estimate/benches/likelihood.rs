@@ -11,7 +11,9 @@ use wakescope_estimate::{Sampling, SignalKind, bound::Noise};
 
 /// 185 lines of 1000 real samples at 250 MHz: 281 to 881 m.
 fn likelihood(criterion: &mut Criterion) {
-    let wake = Wake::from_array(&[500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.35, 2.35, 0.0, 0.0]);
+    let wake = Wake::from_array(&[
+        500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.35, 2.35, 0.0, 0.0, 0.0,
+    ]);
     let setup = ScanSetup {
         sampling: Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap(),
         kind: SignalKind::Real,

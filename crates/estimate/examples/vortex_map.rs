@@ -117,7 +117,9 @@ fn scan(elevation_rad: Vec<f64>, range_m: Vec<f64>, velocity_m_s: Array2<f64>) -
 
 /// A wake of 500 m^2/s in a cross wind, with errors of about 1 m/s.
 fn made_up(model: &WakeModel) -> Result<ScanMap, Box<dyn Error>> {
-    let wake = Wake::from_array(&[500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.35, 2.35, 2.0, 0.0]);
+    let wake = Wake::from_array(&[
+        500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.35, 2.35, 2.0, 0.0, 0.0,
+    ]);
     let elevation_rad: Vec<f64> = (0..93).map(|i| 2.5e-3 * f64::from(i)).collect();
     let range_m: Vec<f64> = (0..40).map(|i| 296.0 + 6.0 * f64::from(i)).collect();
     let mut place = 0.0_f64;

@@ -46,7 +46,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// A table of point velocities of 400 m^2/s with errors of some 0.3 m/s.
 fn made_up() -> Result<PathBuf, Box<dyn Error>> {
-    let wake = Wake::from_array(&[400.0, 400.0, 376.0, 60.0, 424.0, 60.0, 2.5, 2.5, 1.0, 0.0]);
+    let wake = Wake::from_array(&[
+        400.0, 400.0, 376.0, 60.0, 424.0, 60.0, 2.5, 2.5, 1.0, 0.0, 0.0,
+    ]);
     let mut text = String::from("range_m,elevation_rad,velocity_m_s,sigma_m_s\n");
     let mut place = 0.5_f64;
     for (line, gate) in (0..60).flat_map(|line| (0..30).map(move |gate| (line, gate))) {

@@ -158,6 +158,7 @@ fn draw_wake(rng: &mut Xoshiro256PlusPlus, kind: &MapKind) -> (Wake, [Vortex; 2]
         right,
         lateral_wind_m_s: draw_within(rng, [-4.0, 4.0]),
         wind_shear_per_s: draw_within(rng, [-0.02, 0.02]),
+        log_wind_m_s: 0.0,
     };
     (wake, [left_secondary, right_secondary])
 }

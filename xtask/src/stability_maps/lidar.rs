@@ -257,7 +257,7 @@ pub(super) fn orders() -> Result<Vec<Panel>, Failure> {
 
 /// The true pair, as the parameters of a fit.
 const TRUTH: [f64; PARAMETERS] = [
-    500.0, 500.0, 376.5, 47.0, 423.5, 47.0, CORE_M, CORE_M, 0.0, 0.0,
+    500.0, 500.0, 376.5, 47.0, 423.5, 47.0, CORE_M, CORE_M, 0.0, 0.0, 0.0,
 ];
 const CORE_M: f64 = 2.35;
 /// Directions in which starts are away from the pair.

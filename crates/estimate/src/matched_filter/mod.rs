@@ -12,6 +12,7 @@ mod cells;
 use ndarray::{Array1, Array2, Axis};
 
 use crate::parallel::map_indexed;
+use crate::vortex_fit::wake::log_wind::log_of_height;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
 use crate::vortex_fit::{RangeKernel, Wake, WakeModel};
@@ -23,6 +24,8 @@ pub(crate) use cells::{Background, Cells};
 const FAR_OVER_GATE: f64 = 10.0;
 /// A wind whose length without the part of another one is below this fraction, squared, is the other one.
 const DEPENDENT: f64 = 1e-12;
+/// Winds that are left out of all patterns.
+pub(crate) const WINDS: usize = 3;
 
 /// What unit vortices at given positions show in the cells of a scan.
 #[derive(Debug, Clone)]
@@ -31,7 +34,7 @@ pub(crate) struct MatchedFilter {
     kernel: RangeKernel,
     pub(crate) cells: Cells,
     pub(crate) background: Background,
-    /// Uniform wind and shear, white and orthonormal: cells by one or two.
+    /// Uniform wind, shear and the logarithmic part, white and orthonormal: cells by one to three.
     pub(crate) wind: Array2<f64>,
     /// What an anticlockwise vortex of unit circulation at each position shows, white, without wind: positions by cells.
     pub(crate) shapes: Array2<f64>,
@@ -96,11 +99,12 @@ impl MatchedFilter {
     }
 }
 
-/// Velocity of uniform wind and of shear in a cell, both of size 1.
-pub(crate) fn wind_velocities(cells: &Cells, index: usize) -> [f64; 2] {
+/// Velocity of uniform wind, of shear and of a logarithmic part in a cell, each of size 1.
+pub(crate) fn wind_velocities(cells: &Cells, index: usize) -> [f64; WINDS] {
     let cell = &cells.cells[index];
     let cos = cells.elevation_rad[cell.line].cos();
-    [cos, cos * cell.place_m.1]
+    let height_m = cell.place_m.1;
+    [cos, cos * height_m, cos * log_of_height(height_m)]
 }
 
 /// What a wake shows in each cell \[m/s\].
@@ -146,9 +150,9 @@ fn predicted(
         .collect()
 }
 
-/// Uniform wind and shear, white and orthonormal; one direction if the scan does not distinguish them.
+/// Uniform wind, shear and the logarithmic part, white and orthonormal; fewer directions if the scan does not distinguish them.
 fn wind_basis(cells: &Cells, background: &Background) -> Array2<f64> {
-    let mut wind = Array2::from_shape_fn((cells.cells.len(), 2), |(i, direction)| {
+    let mut wind = Array2::from_shape_fn((cells.cells.len(), WINDS), |(i, direction)| {
         wind_velocities(cells, i)[direction]
     });
     background.whiten(&mut wind);

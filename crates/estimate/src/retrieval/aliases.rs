@@ -14,7 +14,7 @@ use crate::retrieval::{Movement, RetrievalOptions, ScanMap};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::SEARCHED;
 use crate::vortex_fit::tolerances::{COMPETES, HOPELESS, MINIMUM};
-use crate::vortex_fit::{Parameter, Wake};
+use crate::vortex_fit::{PARAMETERS, Parameter, Wake};
 
 /// Fastest wind that is tried \[m/s\]: no aircraft lands in a faster cross wind by far.
 const FASTEST_M_S: f64 = 50.0;
@@ -26,7 +26,7 @@ const SAME: f64 = 0.25;
 const MOST_ALIASES: f64 = 20.0;
 
 /// A scan without vortices and without wind.
-pub(super) const CALM: [f64; 10] = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0];
+pub(super) const CALM: [f64; PARAMETERS] = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
 
 /// A map whose velocities are near an assumed wind.
 pub(super) struct Unfolded {
@@ -90,6 +90,7 @@ impl Unfolded {
         Wake {
             lateral_wind_m_s: assumed.lateral_wind_m_s,
             wind_shear_per_s: assumed.wind_shear_per_s,
+            log_wind_m_s: assumed.log_wind_m_s,
             ..*start
         }
     }

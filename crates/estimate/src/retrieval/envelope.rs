@@ -257,8 +257,7 @@ impl Envelopes<'_, '_> {
         let envelope = measured(spectra.velocity_m_s, power, self.threshold, sign)?;
         let place = (spectra.range_m[gate], spectra.elevation_rad[line]);
         let height_m = self.model.position_m(place.0, place.1).1;
-        let wind =
-            (self.about.lateral_wind_m_s + self.about.wind_shear_per_s * height_m) * place.1.cos();
+        let wind = self.about.wind_at_m_s(height_m) * place.1.cos();
         let speed = sign * (envelope - wind);
         // upwards: very fast air is so spread out that nothing of it is above the threshold
         let step = (1..=STEPS_UP)

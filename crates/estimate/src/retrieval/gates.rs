@@ -157,7 +157,7 @@ mod tests {
             sigma_m_s: None,
             fold_m_s: None,
         };
-        let wind = Wake::from_array(&[0.0, 0.0, 90.0, 20.0, 110.0, 20.0, 1.0, 1.0, 2.0, 0.1]);
+        let wind = Wake::from_array(&[0.0, 0.0, 90.0, 20.0, 110.0, 20.0, 1.0, 1.0, 2.0, 0.1, 0.0]);
         let found = expected_velocities(&map, &RetrievalOptions::default(), &wind, true).unwrap();
         let at = |line: usize, gate: usize| {
             let angle = map.elevation_rad[line];

@@ -171,14 +171,14 @@ impl RetrievalOptions {
 }
 
 impl Default for RetrievalOptions {
-    /// Algebraic cores that may as well be others, points, all ten parameters, the loss of Cauchy, the sandwich, moving vortices if that fits.
+    /// Algebraic cores that may as well be others, points, all parameters, the loss of Cauchy, the sandwich, moving vortices if that fits.
     fn default() -> Self {
         Self {
             model: WakeModel::default(),
             other_profile: true,
             gate: Gate::Point,
             free: FreeParameters {
-                wind: WindFit::Linear,
+                wind: WindFit::LogLinear,
                 ..FreeParameters::default()
             },
             core_radius_m: None,

@@ -98,6 +98,7 @@ mod tests {
     use super::*;
     use crate::Measured;
     use crate::retrieval::Side;
+    use crate::vortex_fit::PARAMETERS;
     use ndarray::Array2;
 
     fn map(gate_m: f64, line_rad: f64) -> ScanMap {
@@ -127,7 +128,7 @@ mod tests {
             vortices: vec![vortex],
             wake: None,
             reference_time_s: 0.0,
-            covariance: Array2::zeros((10, 10)),
+            covariance: Array2::zeros((PARAMETERS, PARAMETERS)),
             lateral_wind_m_s: known(0.0),
             wind_shear_per_s: known(0.0),
             chi2_per_dof: 1.0,

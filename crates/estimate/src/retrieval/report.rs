@@ -140,7 +140,7 @@ impl<'a> Report<'a> {
         Ok(are_certain)
     }
 
-    /// Covariance \[10, 10\] of an end.
+    /// Covariance \[11, 11\] of an end.
     pub(crate) fn covariance(&self, end: &End) -> Result<Array2<f64>, Error> {
         self.uncertainty(end)?.covariance(|_| true)
     }

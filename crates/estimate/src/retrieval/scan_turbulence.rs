@@ -316,8 +316,7 @@ fn mean_wind_m_s(map: &ScanMap, cells: &[Cell], model: &WakeModel, wake: &Wake) 
         let elevation_rad = map.elevation_rad[cell.line];
         height_m += model.position_m(range_m, elevation_rad).1;
     }
-    let [.., wind_m_s, shear_per_s] = wake.to_array();
-    wind_m_s + shear_per_s * height_m / cells.len().max(1) as f64
+    wake.wind_at_m_s(height_m / cells.len().max(1) as f64)
 }
 
 /// A distance that no two gates exceed \[m\], at least 1 m.

@@ -66,8 +66,9 @@ mod tests {
         let elevation_rad: Vec<f64> = (0..60).map(|i| 0.02 + 3e-3 * f64::from(i)).collect();
         let range_m: Vec<f64> = (0..36).map(|i| 330.0 + 4.0 * f64::from(i)).collect();
         let model = WakeModel::default();
-        let wake =
-            Wake::from_array(&[400.0, 400.0, 377.0, 48.0, 424.0, 48.0, 2.35, 2.35, 2.0, 0.0]);
+        let wake = Wake::from_array(&[
+            400.0, 400.0, 377.0, 48.0, 424.0, 48.0, 2.35, 2.35, 2.0, 0.0, 0.0,
+        ]);
         let of =
             |(i, j): (usize, usize)| model.radial_velocity_m_s(&wake, range_m[j], elevation_rad[i]);
         let mut map = ScanMap {

@@ -12,7 +12,7 @@ use ndarray::{Array1, Array2, ArrayView1, s};
 use crate::error::{Error, enough_velocities, increasing, not_empty, positive};
 use crate::linalg::cholesky::cholesky;
 use crate::linalg::positive_definite::solve;
-use crate::matched_filter::{Background, Cells, MatchedFilter, wind_velocities};
+use crate::matched_filter::{Background, Cells, MatchedFilter, WINDS, wind_velocities};
 use crate::retrieval::{Gate, ScanMap, ScanTurbulence};
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use crate::wake_detection::bank::{Bank, DetectorOptions, Template};
@@ -208,19 +208,19 @@ impl WakeDetector {
         enough_velocities(means.len() - missing, means.len() - means.len() / MISSING)?;
         let cells = &self.filter.cells.cells;
 
-        let mut curvature = Array2::zeros((2, 2));
-        let mut towards = [0.0; 2];
+        let mut curvature = Array2::zeros((WINDS, WINDS));
+        let mut towards = [0.0; WINDS];
         for i in (0..means.len()).filter(|&i| means[i].is_finite()) {
             let deviation_m_s = cells[i].deviation_m_s;
             let row = wind_velocities(&self.filter.cells, i).map(|x| x / deviation_m_s);
             let value = means[i] / deviation_m_s;
-            for a in 0..2 {
+            for a in 0..WINDS {
                 towards[a] += row[a] * value;
-                (0..2).for_each(|b| curvature[[a, b]] += row[a] * row[b]);
+                (0..WINDS).for_each(|b| curvature[[a, b]] += row[a] * row[b]);
             }
         }
-        let wind = solve(&curvature, &towards)
-            .unwrap_or_else(|| vec![towards[0] / curvature[[0, 0]], 0.0]);
+        let wind =
+            solve(&curvature, &towards).unwrap_or_else(|| vec![towards[0] / curvature[[0, 0]]]);
         for (i, value) in means
             .iter_mut()
             .enumerate()

@@ -27,7 +27,9 @@ fn an_impossible_start_is_passed_over() {
     };
     let blind = errors(&case);
     // Below the ground, where the model has no vortices.
-    let below = [300.0, 300.0, 381.0, -5.0, 419.0, -5.0, 3.0, 3.0, -4.0, 0.03];
+    let below = [
+        300.0, 300.0, 381.0, -5.0, 419.0, -5.0, 3.0, 3.0, -4.0, 0.03, 0.0,
+    ];
     case.options.start = Some(Wake::from_array(&below));
     for (a, b) in errors(&case).iter().zip(&blind) {
         assert!((a - b).abs() < 0.05, "{a} {b}");
@@ -159,7 +161,7 @@ fn outliers_and_unknown_deviations_leave_errors_that_the_covariance_tells() {
             let found = fit_scan(&map, Velocities::Means, &case.options).unwrap();
             let (p, truth) = (found.wake.unwrap().to_array(), case.truth.to_array());
             squares.extend(
-                (0..PARAMETERS).map(|i| (p[i] - truth[i]).powi(2) / found.covariance[[i, i]]),
+                (0..STRAIGHT).map(|i| (p[i] - truth[i]).powi(2) / found.covariance[[i, i]]),
             );
             let rejected = if outliers { 30..90 } else { 0..3 };
             assert!(
@@ -178,7 +180,7 @@ fn outliers_and_unknown_deviations_leave_errors_that_the_covariance_tells() {
 fn weak_unequal_low_and_high_wakes_on_coarse_and_narrow_scans_are_within_their_errors() {
     let of = |p: [f64; 6], core_m: f64, wind: [f64; 2]| {
         Wake::from_array(&[
-            p[0], p[1], p[2], p[3], p[4], p[5], core_m, core_m, wind[0], wind[1],
+            p[0], p[1], p[2], p[3], p[4], p[5], core_m, core_m, wind[0], wind[1], 0.0,
         ])
     };
     let (lines, gates) = ((0.004, 0.004, 56), (330.0, 4.0, 36));
@@ -294,7 +296,9 @@ fn weak_unequal_low_and_high_wakes_on_coarse_and_narrow_scans_are_within_their_e
 fn vortices_beyond_or_at_the_end_of_the_sector_are_told() {
     let options = RetrievalOptions::default();
     let wake = |right_m: f64| {
-        Wake::from_array(&[380.0, 380.0, 400.0, 50.0, right_m, 50.0, 2.5, 2.5, 1.0, 0.0])
+        Wake::from_array(&[
+            380.0, 380.0, 400.0, 50.0, right_m, 50.0, 2.5, 2.5, 1.0, 0.0, 0.0,
+        ])
     };
     let (lines, gates) = ((0.004, 0.004, 56), (330.0, 4.0, 31));
     // 450 m is the last gate
@@ -330,7 +334,9 @@ fn vortices_beyond_or_at_the_end_of_the_sector_are_told() {
 #[test]
 fn folded_velocities_holes_and_cores_that_are_kept() {
     let options = RetrievalOptions::default();
-    let wake = Wake::from_array(&[400.0, 380.0, 380.0, 50.0, 424.0, 48.0, 2.5, 2.5, 9.0, 0.0]);
+    let wake = Wake::from_array(&[
+        400.0, 380.0, 380.0, 50.0, 424.0, 48.0, 2.5, 2.5, 9.0, 0.0, 0.0,
+    ]);
     let (lines, gates) = ((0.004, 0.004, 56), (330.0, 4.0, 36));
     let mut map = noisy(&wake, &options, lines, gates, 3);
     // a band of 20 m/s about 0: what is above 10 m/s comes out below

@@ -47,13 +47,16 @@ pub(crate) fn stored(text: &str) -> (ScanMap, Array2<f64>) {
     (map, column(5))
 }
 
+/// Parameters of a wake in wind and shear, without a logarithmic part.
+pub(crate) const STRAIGHT: usize = Parameter::LogWind as usize;
+
 /// A stored scan with what is known of it.
 pub(crate) struct Case {
     pub(crate) map: ScanMap,
     pub(crate) exact: Array2<f64>,
     pub(crate) truth: Wake,
-    /// Bounds of all ten parameters.
-    pub(crate) bound: [f64; PARAMETERS],
+    /// Bounds of all parameters in a straight wind.
+    pub(crate) bound: [f64; STRAIGHT],
     pub(crate) options: RetrievalOptions,
 }
 
@@ -75,7 +78,9 @@ pub(crate) fn case(name: &str) -> Case {
         "a" => (
             reference!("map_a"),
             0.0,
-            [500.0, 500.0, 376.5, 60.0, 423.5, 60.0, 2.35, 2.35, 2.0, 0.0],
+            [
+                500.0, 500.0, 376.5, 60.0, 423.5, 60.0, 2.35, 2.35, 2.0, 0.0, 0.0,
+            ],
             [
                 3.43065, 3.74845, 0.0489695, 0.0256673, 0.0416861, 0.0288482, 0.0389447, 0.0512751,
                 0.0340653, 5.42644e-4,
@@ -84,7 +89,9 @@ pub(crate) fn case(name: &str) -> Case {
         "b" => (
             reference!("map_b"),
             15.0,
-            [300.0, 300.0, 381.0, 40.0, 419.0, 40.0, 3.0, 3.0, -4.0, 0.03],
+            [
+                300.0, 300.0, 381.0, 40.0, 419.0, 40.0, 3.0, 3.0, -4.0, 0.03, 0.0,
+            ],
             [
                 8.82252,
                 9.44185,
@@ -101,7 +108,9 @@ pub(crate) fn case(name: &str) -> Case {
         _ => (
             reference!("map_c"),
             10.0,
-            [420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.5, 3.0, 0.02],
+            [
+                420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.5, 3.0, 0.02, 0.0,
+            ],
             [
                 3.64935,
                 3.73507,
@@ -128,11 +137,13 @@ pub(crate) fn case(name: &str) -> Case {
     } else {
         Movement::Frozen
     };
-    let options = RetrievalOptions {
+    let mut options = RetrievalOptions {
         gate,
         movement,
         ..Default::default()
     };
+    // as the bounds
+    options.free.wind = WindFit::Linear;
     Case {
         map,
         exact,
@@ -211,7 +222,7 @@ impl Scatter {
     pub(crate) fn told(
         &self,
         name: &str,
-        bound: &[f64; PARAMETERS],
+        bound: &[f64; STRAIGHT],
         (above, off): (f64, f64),
     ) -> (String, bool) {
         let count = self.errors.len() as f64;

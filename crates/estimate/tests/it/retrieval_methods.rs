@@ -65,7 +65,7 @@ fn radial_velocities_have_the_errors_of_the_stored_table() {
     ] {
         let height_m = 47.0 * z;
         let wake = Wake::from_array(&[
-            400.0, 400.0, 376.5, height_m, 423.5, height_m, 2.35, 2.35, 0.0, 0.0,
+            400.0, 400.0, 376.5, height_m, 423.5, height_m, 2.35, 2.35, 0.0, 0.0, 0.0,
         ]);
         let mut map = made_up(&wake, 15.0, 1);
         map.sigma_m_s = Some(Array2::from_elem(map.velocity_m_s.dim(), 0.5));
@@ -180,7 +180,7 @@ fn lone() -> (Wake, WakeModel, f64) {
         ..Default::default()
     };
     let wake = Wake::from_array(&[
-        0.0, 400.0, -1000.0, 60.0, 395.474, 60.0, 2.35, 2.35, 0.0, 0.0,
+        0.0, 400.0, -1000.0, 60.0, 395.474, 60.0, 2.35, 2.35, 0.0, 0.0, 0.0,
     ]);
     (
         wake,

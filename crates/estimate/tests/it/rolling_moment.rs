@@ -34,6 +34,7 @@ fn rolling_moments_are_those_of_the_stored_table() {
             core_m,
             0.0,
             0.0,
+            0.0,
         ]);
         let model = WakeModel {
             images: false,
@@ -65,7 +66,9 @@ fn rolling_moments_are_those_of_the_stored_table() {
 
 #[test]
 fn images_and_both_vortices_add_up_and_impossible_aircraft_are_refused() {
-    let pair = Wake::from_array(&[400.0, 400.0, 350.0, 30.0, 390.0, 30.0, 2.0, 2.0, 0.0, 0.0]);
+    let pair = Wake::from_array(&[
+        400.0, 400.0, 350.0, 30.0, 390.0, 30.0, 2.0, 2.0, 0.0, 0.0, 0.0,
+    ]);
     let follower = Follower {
         span_m: 34.0,
         aspect_ratio: 9.4,

@@ -87,7 +87,9 @@ fn fit_of(map: &ScanMap, options: &RetrievalOptions) -> ScanResult {
 
 /// Vortices of which the ground has driven the left and the right one apart.
 fn grounded() -> Wake {
-    Wake::from_array(&[450.0, 430.0, 345.0, 38.0, 440.0, 42.0, 3.5, 3.5, 0.5, 0.0])
+    Wake::from_array(&[
+        450.0, 430.0, 345.0, 38.0, 440.0, 42.0, 3.5, 3.5, 0.5, 0.0, 0.0,
+    ])
 }
 
 fn secondary_of_grounded() -> [Vortex; 2] {
@@ -309,7 +311,7 @@ fn cores_of_another_profile_are_no_secondary_vortices() {
     for seed in 0..6 {
         let core_m = 2.9 + 0.3 * seed as f64;
         let truth = Wake::from_array(&[
-            400.0, 400.0, 380.0, 20.0, 420.0, 20.0, core_m, core_m, 1.5, 0.0,
+            400.0, 400.0, 380.0, 20.0, 420.0, 20.0, core_m, core_m, 1.5, 0.0, 0.0,
         ]);
         let options = of_gates(4.0);
         let mut air = options.clone();
@@ -373,6 +375,7 @@ fn a_pair_alone_that_moves_has_no_secondary_vortices() {
             2.1,
             0.0,
             0.01,
+            0.0,
         ]);
         let options = of_gates(10.0);
         let map = map_of(&options, &truth, 0.5, 6.0, seed);
@@ -390,7 +393,7 @@ fn a_high_pair_that_drifts_has_no_secondary_vortices() {
     for (seed, height_m) in [25.0, 35.0, 45.0, 55.0].into_iter().enumerate() {
         for drift_m_s in [-2.0, -1.0, 1.0, 2.0] {
             let truth = Wake::from_array(&[
-                370.0, 370.0, 375.0, height_m, 415.0, height_m, 3.0, 3.0, drift_m_s, 0.0,
+                370.0, 370.0, 375.0, height_m, 415.0, height_m, 3.0, 3.0, drift_m_s, 0.0, 0.0,
             ]);
             let mut map = map_of(&of_gates(7.5), &truth, 0.2, 10.0, seed as u64);
             for (mut row, elevation_rad) in map

@@ -68,7 +68,9 @@ fn near(found: &Wake, truth: &Wake, part: f64) {
 
 #[test]
 fn cores_that_are_kept_are_those_that_are_stated() {
-    let truth = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 4.0, 4.0, 1.3, 0.0]);
+    let truth = Wake::from_array(&[
+        480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 4.0, 4.0, 1.3, 0.0, 0.0,
+    ]);
     let free = FreeParameters {
         core_radius: Sharing::Fixed,
         ..Default::default()
@@ -105,7 +107,9 @@ fn cores_that_are_kept_are_those_that_are_stated() {
 
 #[test]
 fn regions_have_the_radius_of_their_range() {
-    let truth = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.5, 2.5, 1.3, 0.0]);
+    let truth = Wake::from_array(&[
+        480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.5, 2.5, 1.3, 0.0, 0.0,
+    ]);
     let radius_m = |range_m: f64| 1.0 + 0.05 * (range_m - 320.0);
     let fit = |map: &VelocityMap<'_>, shown: &EstimatorResponse<'_>| {
         fit_map_of_estimator(map, &WakeModel::default(), shown, &MapFitOptions::default())
@@ -129,7 +133,9 @@ fn regions_have_the_radius_of_their_range() {
 /// A pair that sinks by 7 m while it is scanned.
 #[test]
 fn vortices_that_move_while_they_are_scanned_are_found_where_they_are_in_the_middle() {
-    let truth = Wake::from_array(&[500.0, 500.0, 376.5, 60.0, 423.5, 60.0, 2.35, 2.35, 2.0, 0.0]);
+    let truth = Wake::from_array(&[
+        500.0, 500.0, 376.5, 60.0, 423.5, 60.0, 2.35, 2.35, 2.0, 0.0, 0.0,
+    ]);
     let (elevation_rad, _) = axes();
     let seconds: Vec<f64> = (0..elevation_rad.len())
         .map(|line| 0.075 * line as f64 - 2.0)
@@ -182,9 +188,11 @@ fn cores_that_shrink_on_the_way_are_fitted_where_it_ends() {
         (0..39).map(|i| 0.006 * f64::from(i)).collect(),
         (0..7).map(|i| 288.0 + 38.4 * f64::from(i)).collect(),
     );
-    let truth = Wake::from_array(&[450.0, 450.0, 376.5, 47.0, 423.5, 47.0, 2.35, 2.35, 0.0, 0.0]);
+    let truth = Wake::from_array(&[
+        450.0, 450.0, 376.5, 47.0, 423.5, 47.0, 2.35, 2.35, 0.0, 0.0, 0.0,
+    ]);
     let start = Wake::from_array(&[
-        1736.0, 1749.0, 394.8, 47.0, 405.6, 48.6, 0.49, 0.49, -0.1, 0.0,
+        1736.0, 1749.0, 394.8, 47.0, 405.6, 48.6, 0.49, 0.49, -0.1, 0.0, 0.0,
     ]);
     let (model, options) = (
         WakeModel::default(),
@@ -220,8 +228,11 @@ fn cores_that_shrink_on_the_way_are_fitted_where_it_ends() {
 /// Winds that blow the vortices together, as secondary vortices above them do: a pair in one wind does not explain them.
 #[test]
 fn circulations_are_those_near_the_vortices_where_a_pair_does_not_explain_the_map() {
-    let truth =
-        |wind| Wake::from_array(&[440.0, 440.0, 355.0, 45.0, 445.0, 45.0, 3.0, 3.0, wind, 0.0]);
+    let truth = |wind| {
+        Wake::from_array(&[
+            440.0, 440.0, 355.0, 45.0, 445.0, 45.0, 3.0, 3.0, wind, 0.0, 0.0,
+        ])
+    };
     let same = |map: &VelocityMap<'_>| map.velocity_m_s.to_owned();
     let (left, right) = (
         fitted(&truth(0.7), |r| r, |map, _| same(map)),
@@ -257,7 +268,7 @@ fn circulations_are_those_near_the_vortices_where_a_pair_does_not_explain_the_ma
                 // a vortex that is not in the scan has nothing near it
                 let elsewhere = MapFit {
                     wake: Wake::from_array(&[
-                        440.0, 440.0, -90.0, 45.0, 990.0, 45.0, 3.0, 3.0, 0.0, 0.0,
+                        440.0, 440.0, -90.0, 45.0, 990.0, 45.0, 3.0, 3.0, 0.0, 0.0, 0.0,
                     ]),
                     ..pair.clone()
                 };
@@ -297,8 +308,12 @@ fn circulations_are_those_near_the_vortices_where_a_pair_does_not_explain_the_ma
 /// One vortex has no spacing, and nothing is known of its core but what the map shows.
 #[test]
 fn one_vortex_alone_is_fitted_with_its_core() {
-    let truth = Wake::from_array(&[0.0, 400.0, -600.0, 50.0, 400.0, 50.0, 5.0, 5.0, 1.0, 0.0]);
-    let start = Wake::from_array(&[0.0, 330.0, -600.0, 50.0, 402.0, 51.0, 2.0, 2.0, 0.0, 0.0]);
+    let truth = Wake::from_array(&[
+        0.0, 400.0, -600.0, 50.0, 400.0, 50.0, 5.0, 5.0, 1.0, 0.0, 0.0,
+    ]);
+    let start = Wake::from_array(&[
+        0.0, 330.0, -600.0, 50.0, 402.0, 51.0, 2.0, 2.0, 0.0, 0.0, 0.0,
+    ]);
     let found = fitted(
         &truth,
         |r| r,

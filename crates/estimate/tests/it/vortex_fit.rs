@@ -31,6 +31,7 @@ fn wake(left_m: f64, spacing_m: f64, height_m: f64) -> Wake {
         2.6,
         1.5,
         0.02,
+        0.0,
     ])
 }
 
@@ -432,7 +433,9 @@ fn signals(
 /// scans allow 1.5 x 1.64), without bias.
 #[test]
 fn likelihood_fits_of_raw_signals_are_unbiased_and_near_the_bound() {
-    let truth = Wake::from_array(&[500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.35, 2.35, 0.0, 0.0]);
+    let truth = Wake::from_array(&[
+        500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.35, 2.35, 0.0, 0.0, 0.0,
+    ]);
     let setup = scan((45, 0.085, 0.001_5), 340.0, 42);
     let snr = 4.0;
     let free = FreeParameters {
@@ -507,7 +510,7 @@ fn likelihood_fits_of_raw_signals_are_unbiased_and_near_the_bound() {
 fn several_starts_find_a_higher_top_than_the_usual_core_alone() {
     let pair = |core_m| {
         Wake::from_array(&[
-            380.0, 340.0, 380.0, 30.0, 420.0, 30.0, core_m, core_m, 2.0, 0.0,
+            380.0, 340.0, 380.0, 30.0, 420.0, 30.0, core_m, core_m, 2.0, 0.0, 0.0,
         ])
     };
     let setup = scan((40, 0.05, 0.001_25), 345.0, 38);

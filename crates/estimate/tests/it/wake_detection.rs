@@ -209,7 +209,9 @@ fn holds(statistics: &[f64], law: &EmptyScanLaw, rate: f64) -> (bool, usize) {
 fn the_statistic_is_the_chi_square_that_the_best_wake_of_the_bank_takes_from_the_wind() {
     let case = Case::uneven();
     let detector = case.detector(&DetectorOptions::default());
-    let truth = Wake::from_array(&[300.0, 300.0, 661.0, 93.0, 704.0, 93.0, 2.0, 2.0, 2.0, 0.03]);
+    let truth = Wake::from_array(&[
+        300.0, 300.0, 661.0, 93.0, 704.0, 93.0, 2.0, 2.0, 2.0, 0.03, 0.0,
+    ]);
     let exact = case
         .model
         .map(
@@ -360,7 +362,9 @@ fn a_threshold_for_white_noise_alarms_in_all_but_a_few_of_a_thousand_turbulent_s
         (0.3, 15.0, Some(TURBULENCE)),
     ] {
         let case = Case::of_the_study(noise, gate_m);
-        let wake = Wake::from_array(&[1.0, 1.0, 377.9, 47.7, 424.9, 47.7, 2.35, 2.35, 0.0, 0.0]);
+        let wake = Wake::from_array(&[
+            1.0, 1.0, 377.9, 47.7, 424.9, 47.7, 2.35, 2.35, 0.0, 0.0, 0.0,
+        ]);
         let of = |options: DetectorOptions| {
             let detector = case.detector(&options);
             let threshold = detector
@@ -428,7 +432,9 @@ fn thresholds_are_those_of_an_independent_study_and_wakes_are_found_as_often_as_
         let detector = case.detector(&options);
         let law = detector.calibrate(10_000, stream(5)).unwrap();
         let (threshold, rare) = (law.threshold(1e-2).unwrap(), law.threshold(1e-3).unwrap());
-        let wake = Wake::from_array(&[1.0, 1.0, 377.9, 47.7, 424.9, 47.7, 2.35, 2.35, 0.0, 0.0]);
+        let wake = Wake::from_array(&[
+            1.0, 1.0, 377.9, 47.7, 424.9, 47.7, 2.35, 2.35, 0.0, 0.0, 0.0,
+        ]);
         let trials = detector.trials(&[wake], 2000, stream(6)).unwrap();
         let found_m2_s = trials.circulation_std_m2_s();
         let text = format!(
@@ -573,7 +579,7 @@ fn wakes_to_find_are_as_wide_as_was_asked_and_what_is_found_of_them_has_its_scat
 fn one_vortex_in_view_is_found_as_one() {
     let case = Case::of_the_study(0.5, 0.0);
     let detector = case.detector(&DetectorOptions::default());
-    let truth = Wake::from_array(&[0.0, 60.0, 300.0, 47.0, 391.0, 47.0, 2.0, 2.0, 1.0, 0.0]);
+    let truth = Wake::from_array(&[0.0, 60.0, 300.0, 47.0, 391.0, 47.0, 2.0, 2.0, 1.0, 0.0, 0.0]);
     let exact = case
         .model
         .map(
@@ -605,7 +611,9 @@ fn scans_that_miss_some_velocities_keep_below_the_rate_and_those_that_miss_many_
         .unwrap()
         .threshold(1e-1)
         .unwrap();
-    let wake = Wake::from_array(&[60.0, 60.0, 377.9, 47.7, 424.9, 47.7, 2.35, 2.35, 3.0, 0.02]);
+    let wake = Wake::from_array(&[
+        60.0, 60.0, 377.9, 47.7, 424.9, 47.7, 2.35, 2.35, 3.0, 0.02, 0.0,
+    ]);
     let exact = case
         .model
         .map(

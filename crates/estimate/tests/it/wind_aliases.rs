@@ -15,7 +15,7 @@ const FOLD_M_S: f64 = 16.8;
 fn wake(gamma_m2_s: f64, lateral_m: [f64; 2], wind_m_s: f64) -> Wake {
     let [left, right] = lateral_m;
     Wake::from_array(&[
-        gamma_m2_s, gamma_m2_s, left, 60.0, right, 60.0, 3.0, 3.0, wind_m_s, 0.0,
+        gamma_m2_s, gamma_m2_s, left, 60.0, right, 60.0, 3.0, 3.0, wind_m_s, 0.0, 0.0,
     ])
 }
 

@@ -427,7 +427,7 @@ mod tests {
         let elevation_rad: Vec<f64> = (0..44).map(|i| 0.01 + 4e-3 * f64::from(i)).collect();
         let range_m: Vec<f64> = (0..26).map(|i| 340.0 + 5.0 * f64::from(i)).collect();
         let c = circulation_m2_s;
-        let wake = Wake::from_array(&[c, c, 379.0, 46.0, 421.0, 46.0, 2.0, 2.0, 1.5, 0.01]);
+        let wake = Wake::from_array(&[c, c, 379.0, 46.0, 421.0, 46.0, 2.0, 2.0, 1.5, 0.01, 0.0]);
         let mut rng = stream(seed, "test", 0);
         let velocity_m_s = Array2::from_shape_fn((44, 26), |(i, j)| {
             // twelve uniform numbers are nearly normal
@@ -575,11 +575,11 @@ mod tests {
                 .filter(|f| f.statistic.neighbour_correlation.0 > limit)
                 .count()
         };
-        // a fifth is chance among so few
+        // a seventh is chance among so few
         assert!(
-            beyond(0.2) > 5 && found.iter().filter(|f| f.is_correlated()).count() <= 1,
+            beyond(0.15) > 5 && found.iter().filter(|f| f.is_correlated()).count() <= 1,
             "{}",
-            beyond(0.2)
+            beyond(0.15)
         );
     }
 }

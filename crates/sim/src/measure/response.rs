@@ -169,8 +169,9 @@ mod tests {
                 .map(|range_m| (range_m, 1.0))
                 .collect();
             let response = SceneResponse::new(&plan, snr).unwrap().unwrap();
-            let wake =
-                Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.5, 2.5, 1.3, 0.0]);
+            let wake = Wake::from_array(&[
+                480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.5, 2.5, 1.3, 0.0, 0.0,
+            ]);
             let lines: Vec<f64> = (0..20).map(|line| 0.1 + 2.5e-3 * f64::from(line)).collect();
             let shown = response.response(400.0).unwrap();
             let map = shown

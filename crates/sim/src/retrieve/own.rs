@@ -15,7 +15,9 @@ use crate::scene::DetectorSignal;
 use ndarray::{Array2, ArrayView2, Axis};
 use num_complex::Complex;
 use wakescope_estimate::retrieval::{Flag, ScanMap};
-use wakescope_estimate::vortex_fit::{SignalFit, SignalFitOptions, Wake, fit_signals};
+use wakescope_estimate::vortex_fit::{
+    FreeParameters, SignalFit, SignalFitOptions, Wake, WindFit, fit_signals,
+};
 use wakescope_estimate::window::Sample;
 
 impl SceneResponse {
@@ -77,7 +79,11 @@ impl SceneResponse {
         };
         let setup = self.setup(found.options.model, elevation_rad)?;
         let fit_options = SignalFitOptions {
-            free: found.options.free,
+            // the lines of the signals are too few to tell the logarithmic part, which stays that of the map
+            free: FreeParameters {
+                wind: WindFit::Linear,
+                ..found.options.free
+            },
             ..SignalFitOptions::default()
         };
         let fit = match fit_signals(

@@ -339,14 +339,14 @@ fn vortex_json(vortex: &VortexResult) -> Value {
 
 /// Names of the parameters of a wake in their order.
 const PARAMETER_NAMES: &str = "gamma_left_m2_s gamma_right_m2_s y_left_m z_left_m y_right_m z_right_m core_left_m core_right_m wind_m_s \
-                               shear_per_s";
+                               shear_per_s log_wind_m_s";
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use ndarray::Array2;
     use wakescope_estimate::retrieval::Side;
-    use wakescope_estimate::vortex_fit::WakeModel;
+    use wakescope_estimate::vortex_fit::{PARAMETERS, WakeModel};
 
     fn known(value: f64, std: f64) -> Measured {
         Measured { value, std }
@@ -356,10 +356,10 @@ mod tests {
     fn scan(time_s: f64) -> ScanResult {
         let height_m = 80.0 - 0.3 * time_s;
         let values = [
-            400.0, 400.0, 376.0, height_m, 424.0, height_m, 2.0, 2.0, 1.0, 0.0,
+            400.0, 400.0, 376.0, height_m, 424.0, height_m, 2.0, 2.0, 1.0, 0.0, 0.0,
         ];
         let wake = Wake::from_array(&values);
-        let mut covariance = Array2::<f64>::zeros((10, 10));
+        let mut covariance = Array2::<f64>::zeros((PARAMETERS, PARAMETERS));
         for (i, std) in [8.0, 8.0, 0.6, 0.2, 0.6, 0.2].into_iter().enumerate() {
             covariance[[i, i]] = std * std;
         }

@@ -156,6 +156,7 @@ pub(crate) fn true_wake(truth: &[VortexResult; 2]) -> Option<Wake> {
         right,
         lateral_wind_m_s: 0.0,
         wind_shear_per_s: 0.0,
+        log_wind_m_s: 0.0,
     };
     wake.validate().is_ok().then_some(wake)
 }

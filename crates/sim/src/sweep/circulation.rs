@@ -117,6 +117,7 @@ impl<'p> Retrieval<'p> {
             right,
             lateral_wind_m_s: self.pair.cross_wind_m_s,
             wind_shear_per_s: 0.0,
+            log_wind_m_s: 0.0,
         };
         let pulses = scene.scan.pulses_per_line;
         let lines = g.elevation_rad.iter();

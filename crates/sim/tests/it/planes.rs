@@ -73,7 +73,7 @@ fn up(azimuth: f64) -> Vec<(f64, f64)> {
 fn pair(y_m: [f64; 2], z_m: f64, gamma_m2_s: f64, wind_m_s: f64) -> Wake {
     let [left, right] = y_m;
     Wake::from_array(&[
-        gamma_m2_s, gamma_m2_s, left, z_m, right, z_m, 3.0, 3.0, wind_m_s, 0.0,
+        gamma_m2_s, gamma_m2_s, left, z_m, right, z_m, 3.0, 3.0, wind_m_s, 0.0, 0.0,
     ])
 }
 
@@ -425,7 +425,7 @@ fn the_scan_of_a_weather_radar_is_no_wake_and_the_reason_is_given() {
     let temp = tempfile::tempdir().unwrap();
     let folder = temp.path();
     let (model, mut noise) = (WakeModel::default(), Noise(0.3));
-    let rotors = Wake::from_array(&[1e5, 1e5, 9e3, 2e3, 15e3, 2e3, 500.0, 500.0, 4.0, 1e-3]);
+    let rotors = Wake::from_array(&[1e5, 1e5, 9e3, 2e3, 15e3, 2e3, 500.0, 500.0, 4.0, 1e-3, 0.0]);
     let mut rows = String::from("range_m,azimuth_deg,elevation_deg,velocity_m_s\n");
     for (line, gate) in (0..60).flat_map(|line| (0..100).map(move |gate| (line, gate))) {
         let (range_m, elevation) = (

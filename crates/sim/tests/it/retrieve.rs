@@ -728,7 +728,9 @@ fn several_scans_are_tracked() {
     let mut place = 0.5_f64;
     for scan in 0..4 {
         let z_m = 70.0 - 3.0 * f64::from(scan);
-        let values = [400.0, 400.0, 376.0, z_m, 424.0, z_m, 2.5, 2.5, 1.0, 0.0];
+        let values = [
+            400.0, 400.0, 376.0, z_m, 424.0, z_m, 2.5, 2.5, 1.0, 0.0, 0.0,
+        ];
         let wake = wakescope_estimate::vortex_fit::Wake::from_array(&values);
         for (line, gate) in (0..45).flat_map(|line| (0..22).map(move |gate| (line, gate))) {
             let (range_m, angle) = (330.0 + 7.0 * f64::from(gate), 0.07 + 4e-3 * f64::from(line));

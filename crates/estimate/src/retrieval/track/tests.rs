@@ -1,6 +1,7 @@
 use super::filter::Filter;
 use super::*;
 use crate::retrieval::VortexResult;
+use crate::vortex_fit::PARAMETERS;
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -9,7 +10,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 fn series(count: usize, rng: &mut Xoshiro256PlusPlus) -> (Vec<ScanResult>, Vec<Wake>) {
     let model = crate::vortex_fit::WakeModel::default();
     let mut truth = vec![Wake::from_array(&[
-        400.0, 400.0, 376.5, 80.0, 423.5, 80.0, 2.0, 2.0, 1.0, 0.0,
+        400.0, 400.0, 376.5, 80.0, 423.5, 80.0, 2.0, 2.0, 1.0, 0.0, 0.0,
     ])];
     while truth.len() < count {
         let mut p = truth[truth.len() - 1].to_array();
@@ -63,7 +64,7 @@ fn two_phases(
     let mut results = Vec::new();
     for (k, circulation_m2_s) in truth.iter().enumerate() {
         let c = *circulation_m2_s;
-        let wake = Wake::from_array(&[c, c, 376.5, 80.0, 423.5, 80.0, 2.0, 2.0, 0.0, 0.0]);
+        let wake = Wake::from_array(&[c, c, 376.5, 80.0, 423.5, 80.0, 2.0, 2.0, 0.0, 0.0, 0.0]);
         let mut result = scan(k, &wake, rng);
         result.reference_time_s = 6.0 * k as f64;
         for vortex in &mut result.vortices {
@@ -125,7 +126,7 @@ fn scan(k: usize, wake: &Wake, rng: &mut Xoshiro256PlusPlus) -> ScanResult {
         value: value + std * rng.sample::<f64, _>(rand_distr::StandardNormal),
         std,
     };
-    let mut covariance = Array2::zeros((10, 10));
+    let mut covariance = Array2::zeros((PARAMETERS, PARAMETERS));
     [7.5, 7.5, 0.62, 0.18, 0.62, 0.18]
         .iter()
         .enumerate()

@@ -427,7 +427,9 @@ mod tests {
             (0..130).map(|i| 0.05 + f64::from(i) * 1e-3).collect(),
             (0..40).map(|i| 320.0 + 4.0 * f64::from(i)).collect(),
         );
-        let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.0]);
+        let wake = Wake::from_array(&[
+            480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.0, 0.0,
+        ]);
         let (model, options) = (WakeModel::default(), MapFitOptions::default());
         let velocity_m_s = response
             .map(&model, &wake, &elevation_rad, &range_m)

@@ -504,7 +504,9 @@ mod tests {
     }
 
     fn wake() -> Wake {
-        Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02])
+        Wake::from_array(&[
+            480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02, 0.0,
+        ])
     }
 
     fn response<'a>(
@@ -549,7 +551,7 @@ mod tests {
 
     #[test]
     fn uniform_wind_is_shown_as_it_is() {
-        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 6.0, 0.0]);
+        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 6.0, 0.0, 0.0]);
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
         let peak = SpectralPeak::new(
             &sampling(),
@@ -586,7 +588,9 @@ mod tests {
             2.0,
         )
         .unwrap();
-        let weak = Wake::from_array(&[96.0, 104.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02]);
+        let weak = Wake::from_array(&[
+            96.0, 104.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02, 0.0,
+        ]);
         let shown = response
             .map(&WakeModel::default(), &weak, &LINES_RAD, &RANGES_M)
             .unwrap();

@@ -22,7 +22,8 @@ use crate::vortex_fit::map_fit::prediction::Prediction;
 use crate::vortex_fit::map_fit::residual_covariance::{decaying, of_neighbours};
 use crate::vortex_fit::wake::core_prior::secondary_terms;
 use crate::vortex_fit::wake::free_parameters::{spread, stepped};
-use crate::vortex_fit::{CorePrior, Loss, PARAMETERS, PairPrior, Wake};
+use crate::vortex_fit::wake::log_wind::log_wind_term;
+use crate::vortex_fit::{CorePrior, Loss, PARAMETERS, PairPrior, Parameter, Wake};
 
 /// Expected velocities, those that were measured, and what distances between them cost.
 #[derive(Clone)]
@@ -128,6 +129,7 @@ impl LeastSquares<'_> {
         if let Some(prior) = self.pair_prior {
             known.extend(prior.terms(&Wake::from_list(at), groups));
         }
+        known.extend(log_wind_term(at[Parameter::LogWind as usize], groups));
         if at.len() > PARAMETERS {
             known.extend(secondary_terms(at, groups));
         }

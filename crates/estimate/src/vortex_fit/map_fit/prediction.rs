@@ -78,7 +78,7 @@ fn step(p: &[f64], place: usize) -> f64 {
         0 | 1 => 0.01 * p[place].abs().max(1.0),
         2..=5 => 0.006 * spacing_m,
         6 | 7 => 0.002 * spacing_m,
-        8 => 0.1,
+        8 | 10 => 0.1,
         9 => 0.1 / spacing_m,
         _ => {
             let own = [wake.left, wake.right][(place - PARAMETERS) / SECONDARY_PARAMETERS];

@@ -423,7 +423,9 @@ mod tests {
 
     #[test]
     fn a_core_that_does_not_show_is_kept_alone() {
-        let wake = Wake::from_array(&[480.0, 20.0, 376.5, 45.0, 423.5, 49.0, 4.0, 0.3, 1.3, 0.0]);
+        let wake = Wake::from_array(&[
+            480.0, 20.0, 376.5, 45.0, 423.5, 49.0, 4.0, 0.3, 1.3, 0.0, 0.0,
+        ]);
         let (mut p, mut groups) = (
             wake.to_array().to_vec(),
             vec![vec![0], vec![6], vec![7], vec![8]],

@@ -166,6 +166,7 @@ mod tests {
             2.0,
             1.0,
             0.0,
+            0.0,
         ]);
         MapFit {
             wake,

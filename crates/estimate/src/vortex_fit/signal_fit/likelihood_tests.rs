@@ -24,6 +24,7 @@ fn wake() -> Wake {
         right: vortex(423.5),
         lateral_wind_m_s: 1.0,
         wind_shear_per_s: 0.01,
+        log_wind_m_s: 0.0,
     }
 }
 
@@ -135,7 +136,9 @@ fn gradient_is_the_difference_quotient_of_the_likelihood() {
                 .unwrap()
                 .log_likelihood
         };
-        let h = [1e-2, 1e-2, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4, 1e-6][index];
+        let h = [
+            1e-2, 1e-2, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4, 1e-6, 1e-4,
+        ][index];
         let quotient = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
         let error = (value.by_wake[index] - quotient).abs();
         assert!(

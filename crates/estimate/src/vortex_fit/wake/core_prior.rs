@@ -127,7 +127,9 @@ mod tests {
 
     #[test]
     fn secondary_vortices_are_so_many_deviations_from_what_is_known() {
-        let wake = Wake::from_array(&[480.0, 520.0, 376.5, 40.0, 423.5, 50.0, 2.0, 2.0, 1.3, 0.0]);
+        let wake = Wake::from_array(&[
+            480.0, 520.0, 376.5, 40.0, 423.5, 50.0, 2.0, 2.0, 1.3, 0.0, 0.0,
+        ]);
         // one deviation stronger, farther and wider; half of one weaker, nearer and narrower
         let mut p = wake.to_array().to_vec();
         p.extend([-0.65 * 480.0, 376.5 - 1.2 * 40.0, 40.0, 0.12_f64.ln() + 0.3]);
@@ -147,7 +149,9 @@ mod tests {
 
     #[test]
     fn terms_are_distances_in_deviations_and_their_slopes_difference_quotients() {
-        let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.3, 0.02]);
+        let wake = Wake::from_array(&[
+            480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.3, 0.02, 0.0,
+        ]);
         for core_radius in [Sharing::Common, Sharing::Separate] {
             let groups = FreeParameters {
                 core_radius,

@@ -27,6 +27,8 @@ pub enum WindFit {
     Uniform,
     /// Wind and shear are fitted.
     Linear,
+    /// Wind, shear and the logarithmic part are fitted.
+    LogLinear,
 }
 
 /// What a fit may change.
@@ -87,6 +89,7 @@ impl FreeParameters {
             WindFit::Fixed => {}
             WindFit::Uniform => groups.push(vec![8]),
             WindFit::Linear => groups.extend([vec![8], vec![9]]),
+            WindFit::LogLinear => groups.extend([vec![8], vec![9], vec![10]]),
         }
         groups
     }
@@ -139,7 +142,7 @@ pub(crate) fn gathered(groups: &[Vec<usize>], slope: &[f64], out: &mut [f64]) {
     }
 }
 
-/// Covariance of the parameters of a wake \[10, 10\] from that of the free numbers; fixed parameters have zeros.
+/// Covariance of the parameters of a wake \[11, 11\] from that of the free numbers; fixed parameters have zeros.
 pub(crate) fn spread(groups: &[Vec<usize>], covariance: &Array2<f64>) -> Array2<f64> {
     // each place belongs to one free number at most
     let numbers: [Option<usize>; PARAMETERS] =

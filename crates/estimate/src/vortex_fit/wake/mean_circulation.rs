@@ -98,7 +98,9 @@ mod tests {
 
     #[test]
     fn the_standard_deviation_takes_circulation_and_core_and_their_correlation() {
-        let wake = Wake::from_array(&[500.0, 400.0, 376.5, 45.0, 423.5, 49.0, 2.35, 3.0, 0.0, 0.0]);
+        let wake = Wake::from_array(&[
+            500.0, 400.0, 376.5, 45.0, 423.5, 49.0, 2.35, 3.0, 0.0, 0.0, 0.0,
+        ]);
         let mut covariance = ndarray::Array2::<f64>::zeros((PARAMETERS, PARAMETERS));
         (covariance[[0, 0]], covariance[[6, 6]]) = (100.0, 0.25);
         (covariance[[0, 6]], covariance[[6, 0]]) = (3.0, 3.0);

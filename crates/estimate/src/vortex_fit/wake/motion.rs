@@ -85,7 +85,7 @@ impl WakeModel {
 
     /// Lateral and vertical velocity \[m/s\] of the wind and the vortices of a wake at the centre of one of them.
     fn centre_velocity_m_s(&self, wake: &Wake, own: &Vortex) -> [f64; 2] {
-        let mut lateral_m_s = wake.lateral_wind_m_s + wake.wind_shear_per_s * own.height_m;
+        let mut lateral_m_s = wake.wind_at_m_s(own.height_m);
         let mut vertical_m_s = 0.0;
         for (vortex, _, side, sense) in self.sources(wake) {
             let dy = own.lateral_position_m - vortex.lateral_position_m;
@@ -114,7 +114,9 @@ mod tests {
     /// The truth of the reference map of moving vortices.
     #[test]
     fn centres_move_as_an_independent_program_has_them() {
-        let wake = Wake::from_array(&[420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.5, 3.0, 0.02]);
+        let wake = Wake::from_array(&[
+            420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.5, 3.0, 0.02, 0.0,
+        ]);
         let found = WakeModel::default().centre_velocities_m_s(&wake);
         let stored = [3.497_550_2, -0.910_882_06, 3.528_323_08, -1.125_207_24];
         assert!(
@@ -126,7 +128,9 @@ mod tests {
     #[test]
     fn derivatives_carried_back_are_difference_quotients() {
         let model = WakeModel::default();
-        let wake = Wake::from_array(&[420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.0, 3.0, 0.02]);
+        let wake = Wake::from_array(&[
+            420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.0, 3.0, 0.02, 0.0,
+        ]);
         let seen = |wake: &Wake| {
             let moved = Motion::new(&model, wake).wake_after(wake, 2.5);
             model.radial_velocity_m_s(&moved, 400.0, 0.12)

@@ -10,12 +10,13 @@ use multiversion::multiversion;
 use std::f64::consts::PI;
 
 use crate::error::{Error, finite, positive};
+use crate::vortex_fit::wake::log_wind::log_of_height;
 
 /// Root of 2 s + 1 = exp(s): makes the core radius that of the largest speed of a Lamb-Oseen vortex.
 pub(crate) const LAMB_OSEEN_BETA: f64 = 1.256_431_208_626_169_6;
 
 /// Number of parameters of a [`Wake`].
-pub const PARAMETERS: usize = 10;
+pub const PARAMETERS: usize = 11;
 /// Number of those of a secondary vortex beside one of a pair: circulation, lateral position, height, and the natural logarithm of its core
 /// radius over the height of its vortex.
 pub(crate) const SECONDARY_PARAMETERS: usize = 4;
@@ -43,6 +44,8 @@ pub enum Parameter {
     Wind,
     /// Change of the lateral wind with height \[1/s\].
     Shear,
+    /// Logarithmic part of the lateral wind \[m/s\].
+    LogWind,
 }
 
 /// One vortex.
@@ -109,7 +112,7 @@ impl Vortex {
     }
 }
 
-/// Two vortices and the background wind u(z) = `lateral_wind_m_s` + z `wind_shear_per_s`.
+/// Two vortices and the background wind, a log-linear profile (see [`Wake::wind_at_m_s`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wake {
     /// The vortex at smaller y.
@@ -120,6 +123,8 @@ pub struct Wake {
     pub lateral_wind_m_s: f64,
     /// Change of the lateral wind with height \[1/s\].
     pub wind_shear_per_s: f64,
+    /// Logarithmic part of the lateral wind \[m/s\]: friction velocity over von Karman's constant in neutral air.
+    pub log_wind_m_s: f64,
 }
 
 impl Wake {
@@ -139,6 +144,7 @@ impl Wake {
             r.core_radius_m,
             self.lateral_wind_m_s,
             self.wind_shear_per_s,
+            self.log_wind_m_s,
         ]
     }
 
@@ -150,6 +156,7 @@ impl Wake {
             right: Vortex::at((p[4], p[5]), p[1], p[7]),
             lateral_wind_m_s: p[8],
             wind_shear_per_s: p[9],
+            log_wind_m_s: p[10],
         }
     }
 
@@ -160,6 +167,7 @@ impl Wake {
             right,
             lateral_wind_m_s: 0.0,
             wind_shear_per_s: 0.0,
+            log_wind_m_s: 0.0,
         }
     }
 
@@ -215,7 +223,17 @@ impl Wake {
             self.spacing_m(),
         )?;
         finite("lateral_wind_m_s", self.lateral_wind_m_s)?;
-        finite("wind_shear_per_s", self.wind_shear_per_s)
+        finite("wind_shear_per_s", self.wind_shear_per_s)?;
+        finite("log_wind_m_s", self.log_wind_m_s)
+    }
+
+    /// Lateral wind \[m/s\] at a height \[m\]: u(z) = `lateral_wind_m_s` + z `wind_shear_per_s` + `log_wind_m_s` l(z), a log-linear law
+    /// (Monin and Obukhov 1954). l is the [logarithm](log_of_height) without its straight line, so that the first two are that of the profile.
+    #[must_use]
+    pub fn wind_at_m_s(&self, height_m: f64) -> f64 {
+        self.lateral_wind_m_s
+            + self.wind_shear_per_s * height_m
+            + self.log_wind_m_s * log_of_height(height_m)
     }
 
     /// Whether both vortices have a circulation: one without is none.
@@ -425,10 +443,11 @@ impl WakeModel {
         let slopes = rows.len() > 1;
         for (i, range_m) in range_m.iter().enumerate() {
             let (_, z_m) = self.place(*range_m, ray);
-            rows[0][i] = (wake.lateral_wind_m_s + wake.wind_shear_per_s * z_m) * ray.cos;
+            rows[0][i] = wake.wind_at_m_s(z_m) * ray.cos;
             if slopes {
                 rows[Parameter::Wind as usize + 1][i] = ray.cos;
                 rows[Parameter::Shear as usize + 1][i] = z_m * ray.cos;
+                rows[Parameter::LogWind as usize + 1][i] = log_of_height(z_m) * ray.cos;
             }
         }
         // a search tries vortices one by one
@@ -540,6 +559,7 @@ mod tests {
             right: vortex(520.0, 423.5, 49.0, 2.7),
             lateral_wind_m_s: 1.3,
             wind_shear_per_s: 0.02,
+            log_wind_m_s: 0.4,
         }
     }
 
@@ -631,6 +651,7 @@ mod tests {
         let wake = Wake {
             lateral_wind_m_s: 0.0,
             wind_shear_per_s: 0.0,
+            log_wind_m_s: 0.0,
             ..wake()
         };
         let up = std::f64::consts::FRAC_PI_2;
@@ -648,6 +669,7 @@ mod tests {
             },
             lateral_wind_m_s: 0.0,
             wind_shear_per_s: 0.0,
+            log_wind_m_s: 0.0,
             ..wake()
         };
         let right = wake.right;

@@ -90,7 +90,9 @@ mod tests {
     #[test]
     fn terms_are_distances_in_deviations_and_their_slopes_difference_quotients() {
         let prior = PairPrior::AIRCRAFT;
-        let wake = Wake::from_array(&[360.0, 440.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.3, 0.02]);
+        let wake = Wake::from_array(&[
+            360.0, 440.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.3, 0.02, 0.0,
+        ]);
         let groups = FreeParameters::default().groups();
         let terms = prior.terms(&wake, &groups);
         assert!((terms[0].0 + 0.2 / 0.4).abs() < 1e-12);
@@ -109,7 +111,9 @@ mod tests {
 
     #[test]
     fn what_is_not_free_or_not_there_has_no_terms() {
-        let wake = Wake::from_array(&[360.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.3, 0.02]);
+        let wake = Wake::from_array(&[
+            360.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.3, 0.02, 0.0,
+        ]);
         let one_vortex = FreeParameters::default().groups_of(&wake);
         assert!(PairPrior::AIRCRAFT.terms(&wake, &one_vortex).is_empty());
         let common = FreeParameters {

@@ -263,7 +263,9 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn wake() -> Wake {
-        Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02])
+        Wake::from_array(&[
+            480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02, 0.0,
+        ])
     }
 
     fn gate() -> RangeKernel {
@@ -293,7 +295,7 @@ mod tests {
     #[test]
     fn a_linear_wind_is_seen_a_quarter_sample_before_the_range_of_the_gate() {
         let model = WakeModel::default();
-        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1]);
+        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1, 0.0]);
         let elevation_rad = 0.3_f64;
         let ranges = [300.0, 300.25, 412.3];
         gate().apply(
@@ -378,7 +380,7 @@ mod tests {
 
     #[test]
     fn the_middle_alone_sees_the_same_of_a_linear_wind() {
-        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1]);
+        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1, 0.0]);
         let lopsided = RangeKernel::new(-10.0, 4.0, &[0.1, 0.4, 0.3, 0.15, 0.05]).unwrap();
         let seen = |kernel: &RangeKernel| {
             let mut seen = Vec::new();

@@ -88,7 +88,9 @@ mod tests {
 
     #[test]
     fn a_region_of_no_radius_gives_the_velocities_of_the_kernel() {
-        let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02]);
+        let wake = Wake::from_array(&[
+            480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02, 0.0,
+        ]);
         let model = WakeModel::default();
         let point = RangeKernel::new(0.0, 1.0, &[1.0]).unwrap();
         let map = model
@@ -102,7 +104,7 @@ mod tests {
 
     #[test]
     fn regions_keep_a_wind_that_is_linear_in_height_and_blur_a_core() {
-        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1]);
+        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1, 0.0]);
         let wake = Wake {
             left: crate::vortex_fit::Vortex {
                 circulation_m2_s: 500.0,
@@ -130,7 +132,9 @@ mod tests {
 
     #[test]
     fn impossible_wakes_and_radii_are_refused() {
-        let wake = Wake::from_array(&[500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.0, 2.0, 0.0, 0.0]);
+        let wake = Wake::from_array(&[
+            500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.0, 2.0, 0.0, 0.0, 0.0,
+        ]);
         let model = WakeModel::default();
         let point = RangeKernel::new(0.0, 1.0, &[1.0]).unwrap();
         assert!(
