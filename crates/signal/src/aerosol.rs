@@ -70,7 +70,7 @@ impl AerosolLayer {
     }
 
     /// The layer as a table over height, with an extinction of `lidar_ratio_sr` times the
-    /// backscatter; its values are within 1e-6 of the formula.
+    /// backscatter; its values are within 3e-6 of the formula.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for lengths that are not positive, coefficients or a ratio that are

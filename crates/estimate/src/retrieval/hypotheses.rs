@@ -17,6 +17,7 @@ use crate::vortex_fit::tolerances::{
 };
 use crate::vortex_fit::top::distinct;
 use crate::vortex_fit::wake::core_prior::is_core;
+use crate::vortex_fit::wake::log_wind::log_wind_std_m_s;
 use crate::vortex_fit::{PARAMETERS, Parameter, Vortex, Wake};
 
 /// Where a vortex is that does not exist \[m\] from the other, and the typical core of one without a partner.
@@ -146,6 +147,7 @@ impl<'a> Stage<'a> {
             loss: options.loss,
             prior: options.core_prior,
             pair_prior: None,
+            log_wind_std_m_s: log_wind_std_m_s(&map.view()),
             counted: 1.0,
         };
         Self {

@@ -89,7 +89,7 @@ fn reference_maps_are_retrieved_from_tables() {
             scan["covariance"].as_array().unwrap().len(),
             scan["minima"].as_array().unwrap().is_empty()
         ),
-        (10, false)
+        (11, false)
     );
 }
 

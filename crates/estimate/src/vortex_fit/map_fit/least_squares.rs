@@ -37,6 +37,8 @@ pub(crate) struct LeastSquares<'a> {
     pub(crate) loss: Loss,
     pub(crate) prior: Option<CorePrior>,
     pub(crate) pair_prior: Option<PairPrior>,
+    /// Standard deviation of the logarithmic part of the wind before a fit \[m/s\].
+    pub(crate) log_wind_std_m_s: f64,
     /// Velocities that count as one: as the losses of all of them are added up, so many times what is known before must count.
     pub(crate) counted: f64,
 }
@@ -129,7 +131,8 @@ impl LeastSquares<'_> {
         if let Some(prior) = self.pair_prior {
             known.extend(prior.terms(&Wake::from_list(at), groups));
         }
-        known.extend(log_wind_term(at[Parameter::LogWind as usize], groups));
+        let log_wind = (at[Parameter::LogWind as usize], self.log_wind_std_m_s);
+        known.extend(log_wind_term(log_wind, groups));
         if at.len() > PARAMETERS {
             known.extend(secondary_terms(at, groups));
         }

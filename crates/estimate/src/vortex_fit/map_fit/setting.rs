@@ -17,6 +17,7 @@ use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Scores};
 use crate::vortex_fit::map_fit::prediction::{Linear, Predicted, Prediction, near};
 use crate::vortex_fit::tolerances::{ALMOST_CONVERGED_SIGMAS, MEANS};
 use crate::vortex_fit::wake::core_prior::is_core;
+use crate::vortex_fit::wake::log_wind::log_wind_std_m_s;
 use crate::vortex_fit::{
     CorePrior, MapFit, MapFitOptions, PairPrior, Parameter, RangeKernel, Top, VelocityMap, Wake,
     WakeModel,
@@ -66,6 +67,7 @@ impl Setting<'_, '_> {
             loss,
             prior,
             pair_prior: self.options.pair_prior,
+            log_wind_std_m_s: log_wind_std_m_s(self.map),
             counted: 1.0,
         }
     }
