@@ -36,10 +36,7 @@ fn long_gates_hide_circulations_but_no_wakes() {
         );
         for vortex in &found.vortices {
             let Measured { value, std } = vortex.circulation_m2_s;
-            println!(
-                "{seed} {value} {std} {:?} {:?}",
-                found.flags, vortex.lateral_position_m
-            );
+            assert!(value < 3.0 * std, "{seed}: it is certain: {value} {std}");
             assert!(
                 (vortex.height_m.value - 31.0).abs() < 4.0 * vortex.height_m.std,
                 "{seed}: {:?}",
