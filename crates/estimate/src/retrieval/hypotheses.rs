@@ -17,7 +17,7 @@ use crate::vortex_fit::tolerances::{
 };
 use crate::vortex_fit::top::distinct;
 use crate::vortex_fit::wake::core_prior::is_core;
-use crate::vortex_fit::wake::log_wind::log_wind_std_m_s;
+use crate::vortex_fit::wake::log_wind_prior::log_wind_std_m_s;
 use crate::vortex_fit::{PARAMETERS, Parameter, Vortex, Wake};
 
 /// Where a vortex is that does not exist \[m\] from the other, and the typical core of one without a partner.

@@ -22,7 +22,7 @@ use crate::vortex_fit::map_fit::prediction::Prediction;
 use crate::vortex_fit::map_fit::residual_covariance::{decaying, of_neighbours};
 use crate::vortex_fit::wake::core_prior::secondary_terms;
 use crate::vortex_fit::wake::free_parameters::{spread, stepped};
-use crate::vortex_fit::wake::log_wind::log_wind_term;
+use crate::vortex_fit::wake::log_wind_prior::log_wind_term;
 use crate::vortex_fit::{CorePrior, Loss, PARAMETERS, PairPrior, Parameter, Wake};
 
 /// Expected velocities, those that were measured, and what distances between them cost.

@@ -17,7 +17,7 @@ use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Scores};
 use crate::vortex_fit::map_fit::prediction::{Linear, Predicted, Prediction, near};
 use crate::vortex_fit::tolerances::{ALMOST_CONVERGED_SIGMAS, MEANS};
 use crate::vortex_fit::wake::core_prior::is_core;
-use crate::vortex_fit::wake::log_wind::log_wind_std_m_s;
+use crate::vortex_fit::wake::log_wind_prior::log_wind_std_m_s;
 use crate::vortex_fit::{
     CorePrior, MapFit, MapFitOptions, PairPrior, Parameter, RangeKernel, Top, VelocityMap, Wake,
     WakeModel,

@@ -3,6 +3,7 @@
 pub(crate) mod core_prior;
 pub(crate) mod free_parameters;
 pub(crate) mod log_wind;
+pub(crate) mod log_wind_prior;
 pub(crate) mod mean_circulation;
 pub(crate) mod motion;
 pub(crate) mod pair;
