@@ -303,7 +303,7 @@ impl Setting<'_, '_> {
         let uncertainty = squares.uncertainty(p, groups, from)?;
         let residuals = squares.rows(p, &[]).residuals;
         let cost: f64 = residuals.iter().map(|r| self.options.loss.at(*r).0).sum();
-        // without vortices a gate shows its mean, which is the wind at its middle, as that is linear in height
+        // without vortices a gate shows its mean, which is the wind at its middle, as that is nearly linear along a gate
         let places = (self.map.elevation_rad, self.map.range_m);
         let middle = Gates::at_rest(self.model, self.kernel.middle(), places);
         let wind: Vec<Vec<usize>> = groups

@@ -10,7 +10,8 @@ const LOWEST_M: f64 = 1.0;
 /// Straight line next to ln(1 + z / 1 m) over the lowest 100 m, by least squares: at the ground, and per metre.
 const LINE: f64 = 2.271_109_873_67;
 const LINE_PER_M: f64 = 0.027_803_236_967;
-/// ln(1 + z / 1 m) of a height z \[m\] without its straight line over the lowest 100 m; below the ground as at the ground.
+
+/// ln(1 + z / 1 m) of a height z \[m\] without its straight line over the lowest 100 m; the logarithm stays 0 below the ground.
 pub(crate) fn log_of_height(height_m: f64) -> f64 {
     (1.0 + height_m.max(0.0) / LOWEST_M).ln() - LINE - LINE_PER_M * height_m
 }

@@ -228,7 +228,8 @@ impl Wake {
     }
 
     /// Lateral wind \[m/s\] at a height \[m\]: u(z) = `lateral_wind_m_s` + z `wind_shear_per_s` + `log_wind_m_s` l(z), a log-linear law
-    /// (Monin and Obukhov 1954). l(z) is ln(1 + z / 1 m) without its straight line over the lowest 100 m, so that the first two are that of the profile.
+    /// (Monin and Obukhov 1954). l(z) is ln(1 + z / 1 m) without its straight line over the lowest 100 m, so that the first two are the straight
+    /// line of the profile.
     #[must_use]
     pub fn wind_at_m_s(&self, height_m: f64) -> f64 {
         self.lateral_wind_m_s
