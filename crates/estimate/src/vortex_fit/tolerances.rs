@@ -13,8 +13,7 @@
 //! | [`MEANS`] | 200 | 0.01 | a smooth model from a rough guess; linear models by reweighted least squares |
 //! | [`MEANS_START`] | 200 | 0.1 | as [`MEANS`], but it only leads to a start |
 //! | [`ESTIMATES`] | 40 | 0.03 | estimators round: smaller steps do not change the map |
-//! | [`COARSE_ESTIMATES`] | 40 | 0.5 | few positions, from which the fit to all positions goes on |
-//! | [`SHORT_ESTIMATES`] | 12 | 0.5 | from one of several starts; what needs more is on its way to where another start is nearer, or nowhere |
+//! | [`STARTS`] | 6 | 0.5 | few positions, from each of several starts: fits to all positions go on from there, but for those that are hopeless |
 //! | [`SECONDARY`] | 15 | 0.3 | four vortices: where secondary ones exist, five to ten evaluations suffice |
 
 use crate::vortex_fit::levenberg_marquardt::StoppingRule;
@@ -27,8 +26,7 @@ pub(crate) const EVALUATION: StoppingRule = StoppingRule::new(1, f64::INFINITY);
 pub(crate) const MEANS: StoppingRule = StoppingRule::new(200, 1e-2);
 pub(crate) const MEANS_START: StoppingRule = StoppingRule::new(200, 0.1);
 pub(crate) const ESTIMATES: StoppingRule = StoppingRule::new(40, 0.03);
-pub(crate) const COARSE_ESTIMATES: StoppingRule = StoppingRule::new(40, 0.5);
-pub(crate) const SHORT_ESTIMATES: StoppingRule = StoppingRule::new(12, 0.5);
+pub(crate) const STARTS: StoppingRule = StoppingRule::new(6, 0.5);
 pub(crate) const SECONDARY: StoppingRule = StoppingRule::new(15, 0.3);
 
 /// Estimates that jump keep a fit from smaller steps: it has converged if this step remains after all evaluations, which makes its errors larger by

@@ -65,7 +65,7 @@ impl EstimateFits<'_> {
         }
         let shown = self.shown_at(&self.view, moves)?;
         let for_slopes = shown.coarse_for_slopes();
-        let shown = shown.with_slopes_at(for_slopes.as_ref())?;
+        let shown = shown.with_slopes_at(&for_slopes)?;
         let setting = shown.setting();
         let mut p = fit.wake.to_array().to_vec();
         let mut groups = self.map_options.free.groups_of(&fit.wake);

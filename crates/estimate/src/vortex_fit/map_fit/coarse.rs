@@ -24,14 +24,18 @@ pub(crate) struct Coarse {
 }
 
 impl Coarse {
-    /// Places of a map no farther apart than `line_m` across and `gate_m` along its lines \[m\], unless those of the map are; nothing
-    /// where these are all, or too few.
-    pub(crate) fn of(map: &VelocityMap<'_>, line_m: f64, gate_m: f64) -> Option<Self> {
+    /// Places of a map no farther apart than `line_m` across and `gate_m` along its lines \[m\], unless those of the map are; all of
+    /// them where these are too few.
+    pub(crate) fn of(map: &VelocityMap<'_>, line_m: f64, gate_m: f64) -> Self {
         let (line_step, lines) = every(map.elevation_rad.len(), line_m / map.line_spacing_m());
         let (gate_step, gates) = every(map.range_m.len(), gate_m / map.gate_spacing_m());
         let some = Self::at(map, lines, gates, line_step);
         let found = some.velocity_m_s.iter().filter(|v| v.is_finite()).count();
-        (line_step * gate_step > 1 && found >= NEEDED).then_some(some)
+        if line_step * gate_step == 1 || found >= NEEDED {
+            return some;
+        }
+        let (all_lines, all_gates) = map.velocity_m_s.dim();
+        Self::at(map, (0..all_lines).collect(), (0..all_gates).collect(), 1)
     }
 
     /// The lines and gates that hold a place which is near, `is_near(line, gate)`; without the velocities of those that are not.
@@ -166,7 +170,7 @@ mod tests {
             velocity_m_s: plane.view(),
             standard_deviation_m_s: Some(plane.view()),
         };
-        let coarse = Coarse::of(&map, 3.1, 10.5).unwrap();
+        let coarse = Coarse::of(&map, 3.1, 10.5);
         let some = coarse.map();
         assert_eq!((coarse.line_step, some.velocity_m_s.dim()), (3, (30, 21)));
         assert_eq!(some.elevation_rad[1], elevation_rad[coarse.lines[1]]);
@@ -206,18 +210,21 @@ mod tests {
             velocity_m_s: velocity.view(),
             standard_deviation_m_s: None,
         };
-        assert!(Coarse::of(&map, 0.0, 9.0).is_none());
-        assert!(Coarse::of(&map, f64::NAN, 9.0).is_none());
-        assert!(Coarse::of(&map, 9.0, 20.0).is_none());
-        assert!(
-            Coarse::of(&map, 0.0, 11.0)
-                .is_some_and(|coarse| coarse.map().velocity_m_s.dim() == (90, 21))
-        );
+        for (line_m, gate_m, size) in [
+            (0.0, 9.0, (90, 41)),
+            (f64::NAN, 9.0, (90, 41)),
+            (9.0, 20.0, (90, 41)),
+            (0.0, 11.0, (90, 21)),
+        ] {
+            let coarse = Coarse::of(&map, line_m, gate_m);
+            assert_eq!(coarse.map().velocity_m_s.dim(), size, "{line_m} {gate_m}");
+            assert_eq!(coarse.line_step, 1);
+        }
         let one = VelocityMap {
             elevation_rad: &elevation_rad[..1],
             velocity_m_s: velocity.slice(ndarray::s![..1, ..]),
             ..map
         };
-        assert!(Coarse::of(&one, 3.0, 9.0).is_none());
+        assert_eq!(Coarse::of(&one, 3.0, 9.0).map().velocity_m_s.dim(), (1, 41));
     }
 }

@@ -16,10 +16,10 @@ use crate::vortex_fit::map_fit::guess::first_guesses;
 use crate::vortex_fit::map_fit::local_circulation::{REACH_M, joined};
 use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, near, quotients};
 use crate::vortex_fit::map_fit::setting::Setting;
-use crate::vortex_fit::map_fit::starts::{best_of, rivals, starts, with_typical_core};
-use crate::vortex_fit::tolerances::{
-    COARSE_ESTIMATES, ESTIMATES, MEANS, MEANS_START, SHORT_ESTIMATES,
+use crate::vortex_fit::map_fit::starts::{
+    best_of, rivals, same, starts_about, with_large_cores, with_typical_core,
 };
+use crate::vortex_fit::tolerances::{ESTIMATES, MEANS, MEANS_START, ONE_SIGMAS, STARTS};
 use crate::vortex_fit::top::distinct;
 use crate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, SecondaryVortices,
@@ -28,11 +28,13 @@ use crate::vortex_fit::{
 
 /// The least core radius over a region's radius, or over the distance of lines.
 const SMALLEST_CORE: f64 = 0.25;
-/// Places that tell nearly all of a map: no farther apart than this part of the radius of its regions, for starts and for slopes (half the
-/// radius for these saves a tenth of the time, but heights scatter by some per cent more), and of the width of its gates.
-const LINES_OVER_RADIUS: [f64; 2] = [0.8, 0.3];
+/// Places that tell nearly all of a map: no farther apart than these parts of the radius of its regions, for starts, for secondary vortices and for
+/// slopes (half the radius for these saves a tenth of the time, but heights scatter by some per cent more), and of the width of its gates.
+const START_LINES_OVER_RADIUS: f64 = 1.6;
+const SECONDARY_LINES_OVER_RADIUS: f64 = 0.8;
+const SLOPE_LINES_OVER_RADIUS: f64 = 0.3;
 const GATES_OVER_WIDTH: f64 = 0.6;
-/// Nodes of the air are so much farther apart there.
+/// Nodes of the air are farther apart there by this factor.
 const COARSER_NODES: f64 = 2.0;
 
 /// Fits the wake to a map whose velocities are means over gates, without any prior knowledge: a search for the best pair, then a fit from there with
@@ -57,9 +59,9 @@ pub fn fit_map(
         options,
         least_core_m: 0.0,
     };
-    let best = best_of(&starts(guess, options), |start| {
-        setting.descended(start, MEANS)
-    })?;
+    let mut starts = starts_about(guess, options);
+    starts.extend(with_large_cores(guess, options));
+    let best = best_of(&starts, |start| setting.descended(start, MEANS))?;
     let fit = with_typical_core(best, options, |start| setting.descended(start, MEANS))?;
     fit.standing_out(options.least_statistic)
 }
@@ -79,16 +81,13 @@ pub fn fit_map_of_estimator(
     map.validate()?;
     let full = EstimatorPrediction::new(map, model, response, options, 1.0)?;
     let guesses = first_guesses(map, model, &full.prepared.kernel, options.least_statistic)?;
-    let coarse = full.coarse(LINES_OVER_RADIUS[0]);
-    let thinned = coarse.as_ref().map(|coarse| full.at(coarse)).transpose()?;
-    let about = match &thinned {
-        Some(thinned) => thinned.ends_of_means(&guesses, &thinned.prepared.kernel),
-        None => full.ends_of_means(&guesses, &full.prepared.kernel.coarser(2)),
-    };
+    let coarse = full.coarse(START_LINES_OVER_RADIUS);
+    let thinned = full.at(&coarse)?;
+    let about = thinned.ends_of_means(&guesses);
     let for_slopes = full.coarse_for_slopes();
-    let full = full.with_slopes_at(for_slopes.as_ref())?;
-    let best = match full.best_about(&about, thinned.as_ref()) {
-        Err(Error::NotConverged { .. }) => full.best_about(&guesses, thinned.as_ref()),
+    let full = full.with_slopes_at(&for_slopes)?;
+    let best = match full.best_about(&about, &thinned) {
+        Err(Error::NotConverged { .. }) => full.best_about(&guesses, &thinned),
         first => first,
     };
     let fit = with_typical_core(best?, options, |start| full.refined(start, ESTIMATES))?;
@@ -110,8 +109,7 @@ pub fn refine_map_fit_of_estimator(
     map.validate()?;
     let full = EstimatorPrediction::new(map, model, response, options, 1.0)?;
     let for_slopes = full.coarse_for_slopes();
-    full.with_slopes_at(for_slopes.as_ref())?
-        .refined(guess, ESTIMATES)
+    full.with_slopes_at(&for_slopes)?.refined(guess, ESTIMATES)
 }
 
 /// Secondary vortices beside the pair of a fit, if the map shows them or the options want them anyway, and that pair with them: both are fitted at
@@ -130,13 +128,10 @@ pub fn fit_secondary_vortices(
     map.validate()?;
     pair.validate()?;
     let full = EstimatorPrediction::new(map, model, response, options, 1.0)?;
-    let coarse = full.coarse(LINES_OVER_RADIUS[0]);
-    let thinned = coarse.as_ref().map(|coarse| full.at(coarse)).transpose()?;
-    let found = thinned.as_ref().map_or_else(
-        || full.setting().with_secondary(pair),
-        |thinned| thinned.setting().with_secondary(pair),
-    );
-    let Some(found) = found else { return Ok(None) };
+    let coarse = full.coarse(SECONDARY_LINES_OVER_RADIUS);
+    let Some(found) = full.at(&coarse)?.setting().with_secondary(pair) else {
+        return Ok(None);
+    };
     if !found.fitted {
         return Ok(Some((None, found)));
     }
@@ -217,12 +212,12 @@ impl<'a, 'm: 'a> EstimatorPrediction<'a, 'm> {
     }
 
     /// The places at which slopes are taken.
-    pub(crate) fn coarse_for_slopes(&self) -> Option<Coarse> {
-        self.coarse(LINES_OVER_RADIUS[1])
+    pub(crate) fn coarse_for_slopes(&self) -> Coarse {
+        self.coarse(SLOPE_LINES_OVER_RADIUS)
     }
 
     /// The places that tell nearly all of the map.
-    fn coarse(&self, lines_over_radius: f64) -> Option<Coarse> {
+    fn coarse(&self, lines_over_radius: f64) -> Coarse {
         let line_m = lines_over_radius * self.prepared.response.least_radius_m(self.map.range_m);
         Coarse::of(
             &self.map,
@@ -250,11 +245,12 @@ impl<'a, 'm: 'a> EstimatorPrediction<'a, 'm> {
         )
     }
 
-    /// The same with slopes at some places.
-    pub(crate) fn with_slopes_at(self, places: Option<&'a Coarse>) -> Result<Self, Error> {
-        let slopes_at = places
-            .map(|places| Ok((places, self.at(places)?.prepared)))
-            .transpose()?;
+    /// The same with slopes at some places. Where these are all, slopes need the nodes of the velocities: small cores fall between coarser ones.
+    pub(crate) fn with_slopes_at(self, places: &'a Coarse) -> Result<Self, Error> {
+        if places.map().velocity_m_s.dim() == self.map.velocity_m_s.dim() {
+            return Ok(self);
+        }
+        let slopes_at = Some((places, self.at(places)?.prepared));
         Ok(Self { slopes_at, ..self })
     }
 
@@ -276,11 +272,12 @@ impl<'a, 'm: 'a> EstimatorPrediction<'a, 'm> {
         }
     }
 
-    /// Minima of fits of means over `kernel`, started from some guesses. A guess is returned, too,
+    /// Different minima of fits of means over gates, started from some guesses. A guess is returned, too,
     /// where a vortex left the map during the fit, and alone where the fit did not converge. Peaks
     /// that are fitted as means mislead the core radius most, so it is fixed.
-    fn ends_of_means(&self, guesses: &[Wake], kernel: &RangeKernel) -> Vec<Wake> {
+    fn ends_of_means(&self, guesses: &[Wake]) -> Vec<Wake> {
         let model = self.prepared.model;
+        let kernel = &self.prepared.kernel;
         let sector = (self.map.elevation_rad, self.map.range_m);
         let gates = Gates::at_rest(model, kernel.clone(), sector);
         let options = MapFitOptions {
@@ -299,30 +296,35 @@ impl<'a, 'm: 'a> EstimatorPrediction<'a, 'm> {
             least_core_m: 0.0,
         };
         let mut ends = Vec::new();
+        let mut wakes = Vec::new();
         for guess in guesses {
             let end = setting.descended(guess, MEANS_START).ok();
-            let end = end.map(|fit| fit.wake);
-            ends.extend(end);
-            let is_in_map = end.is_some_and(|end| {
-                model.sees(sector, end.left.place_m()) && model.sees(sector, end.right.place_m())
+            let is_in_map = end.as_ref().is_some_and(|MapFit { wake, .. }| {
+                model.sees(sector, wake.left.place_m()) && model.sees(sector, wake.right.place_m())
             });
             if !is_in_map {
-                ends.push(*guess);
+                wakes.push(*guess);
             }
+            ends.extend(end);
         }
-        distinct(ends, |a, b| near(&a.to_array(), &b.to_array()))
+        let ends = distinct(ends, |a, b| same(a, b, ONE_SIGMAS));
+        wakes.extend(ends.iter().map(|end| end.wake));
+        distinct(wakes, |a, b| near(&a.to_array(), &b.to_array()))
     }
 
-    /// Where the fits from some starts end that do, without those that are one.
-    fn ends(&self, starts: &[Wake], stop: StoppingRule) -> Vec<Wake> {
+    /// Where rough fits from some starts are after a few steps.
+    fn ends(&self, starts: &[Wake]) -> Vec<MapFit> {
+        let setting = self.setting();
         let mut ends = Vec::new();
         for start in starts {
-            let end = self.refined(start, stop).and_then(|end| {
-                with_typical_core(end, &self.options, |start| self.refined(start, stop))
+            let end = setting.approached(start, STARTS).and_then(|end| {
+                with_typical_core(end, &self.options, |start| {
+                    setting.approached(start, STARTS)
+                })
             });
             ends.extend(end);
         }
-        rivals(ends)
+        ends
     }
 
     /// The fit by steps of Gauss and Newton from a start on.
@@ -330,23 +332,29 @@ impl<'a, 'm: 'a> EstimatorPrediction<'a, 'm> {
         self.setting().refined(start, stop)
     }
 
-    /// The best of the fits from the starts about some wakes, by way of rough fits: to the `thinned` map or, where the map cannot be
-    /// thinned, to itself, which shows the starts that lead to one minimum and those that lead nowhere.
+    /// The best of the fits from the starts about some wakes, by way of rough fits to the `thinned` map, which show the starts that lead to one
+    /// minimum and those that lead nowhere. Where these end, large cores are tried, too.
     fn best_about(
         &self,
         wakes: &[Wake],
-        thinned: Option<&EstimatorPrediction<'_, '_>>,
+        thinned: &EstimatorPrediction<'_, '_>,
     ) -> Result<MapFit, Error> {
-        let starts: Vec<Wake> = wakes
-            .iter()
-            .flat_map(|about| starts(about, &self.options))
-            .collect();
-        let ends = match thinned {
-            Some(thinned) => thinned.ends(&starts, COARSE_ESTIMATES),
-            None if starts.len() > 1 => self.ends(&starts, SHORT_ESTIMATES),
-            None => Vec::new(),
-        };
-        let starts = if ends.is_empty() { starts } else { ends };
+        let mut starts = Vec::new();
+        for about in wakes {
+            starts.extend(starts_about(about, &self.options));
+        }
+        let mut ends = thinned.ends(&starts);
+        if !ends.is_empty() {
+            starts = rivals(&ends);
+        }
+        let mut large = Vec::new();
+        for start in &starts {
+            large.extend(with_large_cores(start, &self.options));
+        }
+        ends.extend(thinned.ends(&large));
+        if !ends.is_empty() {
+            starts = rivals(&ends);
+        }
         best_of(&starts, |start| self.refined(start, ESTIMATES))
     }
 }
@@ -441,11 +449,11 @@ mod tests {
             standard_deviation_m_s: None,
         };
         let whole = EstimatorPrediction::new(&map, &model, &response, &options, 1.0).unwrap();
-        let coarse = whole.coarse_for_slopes().unwrap();
+        let coarse = whole.coarse_for_slopes();
         assert!(2 * coarse.map().velocity_m_s.len() <= velocity_m_s.len());
         let groups = options.free.groups();
         let all = whole.predict(&wake.to_array(), &groups).slopes;
-        let whole = whole.with_slopes_at(Some(&coarse)).unwrap();
+        let whole = whole.with_slopes_at(&coarse).unwrap();
         let some = whole.predict(&wake.to_array(), &groups).slopes;
         for ((group, some), all) in groups.iter().zip(&some).zip(&all) {
             let product = |a: &Array2<f64>, b: &Array2<f64>| (a * b).sum();

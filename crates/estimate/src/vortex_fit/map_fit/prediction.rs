@@ -7,7 +7,7 @@
 use ndarray::{Array2, Zip};
 
 use crate::vortex_fit::map_fit::cells::Cell;
-use crate::vortex_fit::wake::free_parameters::stepped;
+use crate::vortex_fit::wake::free_parameters::{free_numbers, stepped};
 use crate::vortex_fit::wake::pair::SECONDARY_PARAMETERS;
 use crate::vortex_fit::{PARAMETERS, Wake};
 
@@ -58,6 +58,8 @@ pub(crate) fn quotients(
 
 /// Slopes about one list of parameters serve for another while no parameter is more than so many steps, each a third of an error, away.
 const NEAR: f64 = 3.0;
+/// Or while the step to it is less than this many standard errors.
+const NEAR_SIGMAS: f64 = 1.0;
 /// The map is linear enough over this many steps.
 const REACH: f64 = 12.0;
 /// Spacing that stands for that of a vortex without a partner \[m\].
@@ -118,6 +120,18 @@ impl Linear {
         let mut cells = self.cells.clone();
         cells.retain(|cell| velocity_m_s[[cell.line, cell.gate]].is_finite());
         cells
+    }
+
+    /// Whether its slopes serve for other parameters, too; `curvature` is that of the sum of squares.
+    pub(crate) fn serves(&self, p: &[f64], curvature: &Array2<f64>) -> bool {
+        let away: Vec<f64> = p
+            .iter()
+            .zip(&self.slopes_at)
+            .map(|(p, at)| p - at)
+            .collect();
+        let away = free_numbers(&away, &self.groups);
+        let sigmas = (away.dot(&curvature.dot(&away)) / self.counted).sqrt();
+        near(&self.slopes_at, p) || sigmas <= NEAR_SIGMAS
     }
 
     /// The part of the way to other parameters that the slopes can speak for.

@@ -6,7 +6,7 @@
 //! logarithm of the residuals is fitted by a straight line over ln(1 + variance of the air / its median), whose slope p gives standard deviations
 //! (1 + ...)^p. Check: exact maps; the power of made-up residuals; the spread of fits over many maps.
 
-use ndarray::{Array1, Array2};
+use ndarray::Array2;
 
 use crate::error::{Error, enough_velocities, finite};
 use crate::vortex_fit::levenberg_marquardt::{StoppingRule, converged};
@@ -14,9 +14,10 @@ use crate::vortex_fit::map_fit::cells::{Cell, cells};
 use crate::vortex_fit::map_fit::data::{median, robust_scale};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Scores};
-use crate::vortex_fit::map_fit::prediction::{Linear, Predicted, Prediction, near};
+use crate::vortex_fit::map_fit::prediction::{Linear, Predicted, Prediction};
 use crate::vortex_fit::tolerances::{ALMOST_CONVERGED_SIGMAS, MEANS};
 use crate::vortex_fit::wake::core_prior::is_core;
+use crate::vortex_fit::wake::free_parameters::free_numbers;
 use crate::vortex_fit::wake::log_wind_prior::log_wind_std_m_s;
 use crate::vortex_fit::{
     CorePrior, MapFit, MapFitOptions, PairPrior, Parameter, RangeKernel, Top, VelocityMap, Wake,
@@ -136,35 +137,53 @@ impl Setting<'_, '_> {
     pub(crate) fn refined(&self, start: &Wake, stop: StoppingRule) -> Result<MapFit, Error> {
         let groups = self.groups(start)?;
         let start = self.options.free.start(start).to_array().to_vec();
-        let linear = self.settled(start, &groups, stop, None)?;
-        self.outcome(
-            &self.about(&linear),
-            &linear.at,
-            &linear.groups,
-            linear.scale,
-        )
+        self.outcome_of(&self.settled(start, &groups, stop, None)?)
     }
 
-    /// Steps of Gauss and Newton, with so many velocities counted as one or as many as the residuals say.
+    /// Where the steps of Gauss and Newton from a start on are after those that `stop` allows.
+    pub(crate) fn approached(&self, start: &Wake, stop: StoppingRule) -> Result<MapFit, Error> {
+        let groups = self.groups(start)?;
+        let start = self.options.free.start(start).to_array().to_vec();
+        self.outcome_of(&self.descent(start, &groups, stop, None)?.0)
+    }
+
+    /// The end of steps of Gauss and Newton, with so many velocities counted as one or as many as the residuals say.
     pub(crate) fn settled(
+        &self,
+        start: Vec<f64>,
+        groups: &[Vec<usize>],
+        stop: StoppingRule,
+        counted: Option<f64>,
+    ) -> Result<Linear, Error> {
+        let (linear, sigmas_left) = self.descent(start, groups, stop, counted)?;
+        if sigmas_left <= stop.sigmas.max(ALMOST_CONVERGED_SIGMAS) {
+            Ok(linear)
+        } else {
+            Err(not_converged(stop.iterations, sigmas_left))
+        }
+    }
+
+    /// Steps of Gauss and Newton until a small one is left or there have been as many as `stop` allows, and the step that is left \[standard
+    /// deviations\].
+    fn descent(
         &self,
         mut p: Vec<f64>,
         all: &[Vec<usize>],
         stop: StoppingRule,
         counted: Option<f64>,
-    ) -> Result<Linear, Error> {
+    ) -> Result<(Linear, f64), Error> {
         let mut groups = all.to_vec();
         let mut are_cores_released = false;
         let mut turns = 0;
         let mut last = vec![0.0; p.len()];
         let mut sigmas_left = f64::INFINITY;
-        let mut last_linear: Option<Linear> = None;
+        let mut known: Option<Linear> = None;
         let mut alike = 1.0;
         let mut steps = 0;
         let mut most = stop.iterations;
         while steps < most {
             steps += 1;
-            let linear = self.next_linear(&p, &groups, last_linear.take(), counted)?;
+            let linear = self.next_linear(&p, &groups, known.take(), counted)?;
             alike = linear.counted;
             let squares = self.about(&linear);
             let next = squares.reweighted(&p, &groups, MEANS)?;
@@ -185,39 +204,34 @@ impl Setting<'_, '_> {
                     most = steps + stop.iterations;
                     continue;
                 }
-                return Ok(linear);
+                return Ok((linear, sigmas_left));
             }
             let longest = share.min(linear.reach(&next));
             p = self
                 .moved(&p, &way, longest)
                 .ok_or(not_converged(steps, sigmas_left))?;
             last = way;
-            last_linear = Some(linear);
             keep_small_cores(&mut p, &mut groups, self.least_core_m);
+            if groups.len() == linear.groups.len() && linear.serves(&p, &normal.curvature) {
+                known = Some(linear);
+            }
         }
-        if sigmas_left <= ALMOST_CONVERGED_SIGMAS {
-            let linear = self.linear(&p, &groups, None)?;
-            return Ok(Linear {
-                counted: alike,
-                ..linear
-            });
-        }
-        Err(not_converged(steps, sigmas_left))
+        let mut linear = self.linear(&p, &groups, None)?;
+        linear.counted = alike;
+        Ok((linear, sigmas_left))
     }
 
-    /// The model made linear about `p`, with the slopes of the last step if they serve there. How many velocities count as one is given or taken
-    /// from the residuals wherever slopes are.
+    /// The model made linear about `p`, with slopes that are known or taken anew. How many velocities count as one is given or taken from the
+    /// residuals wherever slopes are.
     fn next_linear(
         &self,
         p: &[f64],
         groups: &[Vec<usize>],
-        last: Option<Linear>,
+        known: Option<Linear>,
         counted: Option<f64>,
     ) -> Result<Linear, Error> {
-        let kept =
-            last.filter(|last| near(&last.slopes_at, p) && last.here.slopes.len() == groups.len());
-        let counted = counted.or(kept.as_ref().map(|kept| kept.counted));
-        let mut linear = self.linear(p, groups, kept)?;
+        let counted = counted.or(known.as_ref().map(|known| known.counted));
+        let mut linear = self.linear(p, groups, known)?;
         linear.counted = match counted {
             Some(counted) => counted,
             None => self.about(&linear).alike(p, self.options.correlated_lines),
@@ -288,6 +302,11 @@ impl Setting<'_, '_> {
             away_m_s -= fold_m_s * (away_m_s / fold_m_s).round();
         }
         away_m_s / cell.sigma_m_s
+    }
+
+    fn outcome_of(&self, linear: &Linear) -> Result<MapFit, Error> {
+        let squares = self.about(linear);
+        self.outcome(&squares, &linear.at, &linear.groups, linear.scale)
     }
 
     fn outcome(
@@ -362,11 +381,6 @@ fn averaged(turns: &mut u32, with_last: f64, of_last: f64) -> f64 {
 /// The first end that there is of a part of a step, its half, its quarter and so on.
 fn halved<T>(part: f64, end: impl Fn(f64) -> Option<T>) -> Option<T> {
     (0..=HALVINGS).find_map(|halving| end(part * 0.5_f64.powi(halving)))
-}
-
-/// A step of the free numbers, from that of all parameters.
-fn free_numbers(step: &[f64], groups: &[Vec<usize>]) -> Array1<f64> {
-    groups.iter().map(|group| step[group[0]]).collect()
 }
 
 /// Standard deviations of the velocities of cells over those in uniform wind, as their residuals tell: ln|r| is a straight line over ln(1 +

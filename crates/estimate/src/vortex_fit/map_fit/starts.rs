@@ -7,38 +7,41 @@ use crate::error::Error;
 use crate::vortex_fit::map_fit::prediction::LONE_M;
 use crate::vortex_fit::tolerances::{COMPETES, HOPELESS_OF_ESTIMATES, ONE_SIGMAS, SAME_SIGMAS};
 use crate::vortex_fit::top::{distinct, mixed};
-use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Wake};
+use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, PARAMETERS, Sharing, Wake};
 
 /// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span, 3.8 to 6.4 % of the spacing).
 pub(crate) const CORE_OVER_SPACING: f64 = CorePrior::TYPICAL.median_ratio;
-/// Core radii of the starts over the spacing, if they are fitted.
-const CORES_OVER_SPACING: [f64; 2] = [CORE_OVER_SPACING, 0.1];
+/// Large core radius over the spacing, from which fits start once more.
+const LARGE_CORE_OVER_SPACING: f64 = 0.1;
 /// Circulation of a vortex over that of its partner, below which another one may be the partner.
 const WEAK: f64 = 0.5;
 /// Relative change of the typical core at which its iteration ends, and the largest number of rounds.
 const TYPICAL: f64 = 0.05;
 const ROUNDS: usize = 3;
 
-/// The starts about a wake: its core radii are the one that is kept, the typical one, or that and others if they are fitted. Where one vortex is far
-/// weaker than the other, a pair of equal ones is the other start.
-pub(crate) fn starts(about: &Wake, options: &MapFitOptions) -> Vec<Wake> {
-    let mut starts = with_start_cores(about, options);
+/// The starts about a wake: its core radii are the one that is kept, or the typical one. Where one vortex is far weaker than the other, a pair of
+/// equal ones is the other start.
+pub(crate) fn starts_about(about: &Wake, options: &MapFitOptions) -> Vec<Wake> {
+    let mut starts = vec![with_start_core(about, options)];
     if let Some(equal) = with_equal_partner(about) {
-        starts.truncate(1);
-        starts.extend(with_start_cores(&equal, options).first());
+        starts.push(with_start_core(&equal, options));
     }
     starts
 }
 
-/// A wake with each of the core radii that fits start with.
-fn with_start_cores(wake: &Wake, options: &MapFitOptions) -> Vec<Wake> {
-    let typical_m = CORES_OVER_SPACING.map(|over_spacing| over_spacing * wake.spacing_m());
+/// A wake with the core radii that fits start with.
+fn with_start_core(wake: &Wake, options: &MapFitOptions) -> Wake {
+    let typical_m = CORE_OVER_SPACING * wake.spacing_m();
     match options.free.core_radius {
-        Sharing::Fixed => vec![wake.with_cores(options.core_radius_m.unwrap_or(typical_m[0]))],
-        Sharing::Common | Sharing::Separate => {
-            typical_m.map(|core_m| wake.with_cores(core_m)).to_vec()
-        }
+        Sharing::Fixed => wake.with_cores(options.core_radius_m.unwrap_or(typical_m)),
+        Sharing::Common | Sharing::Separate => wake.with_cores(typical_m),
     }
+}
+
+/// A wake with the large cores from which a fit starts once more, if core radii are fitted.
+pub(crate) fn with_large_cores(wake: &Wake, options: &MapFitOptions) -> Option<Wake> {
+    let is_fitted = options.free.core_radius != Sharing::Fixed;
+    is_fitted.then(|| wake.with_cores(LARGE_CORE_OVER_SPACING * wake.spacing_m()))
 }
 
 /// A vortex whose partner is far weaker with one like itself in its place, as where the partner is beyond the scan and what is taken for it is not.
@@ -83,7 +86,7 @@ pub(crate) fn with_typical_core(
     fit: impl Fn(&Wake) -> Result<MapFit, Error>,
 ) -> Result<MapFit, Error> {
     for _ in 0..ROUNDS {
-        let next = with_start_cores(&end.wake, options)[0];
+        let next = with_start_core(&end.wake, options);
         let ratio = end.wake.left.core_radius_m / next.left.core_radius_m;
         let is_off = (ratio - 1.0).abs() > TYPICAL;
         if options.free.core_radius != Sharing::Fixed || !is_off {
@@ -99,23 +102,22 @@ pub(crate) fn chi2(end: &MapFit) -> f64 {
     end.tops.first().map_or(f64::INFINITY, |top| top.chi2)
 }
 
-/// Whether two minima are closer than this number of standard errors of the first.
-fn same(a: &MapFit, b: &MapFit, sigmas: f64) -> bool {
-    let apart = b
-        .wake
-        .to_array()
-        .into_iter()
-        .zip(a.wake.to_array())
-        .map(|(b, a)| b - a);
-    apart
-        .enumerate()
-        .all(|(i, d)| d.powi(2) <= sigmas.powi(2) * a.covariance[[i, i]])
+/// Whether two minima are closer than this number of standard errors of the first, in all that either of them has fitted.
+pub(crate) fn same(a: &MapFit, b: &MapFit, sigmas: f64) -> bool {
+    let at = a.wake.to_array();
+    let other = b.wake.to_array();
+    (0..PARAMETERS).all(|i| {
+        let variance = a.covariance[[i, i]];
+        let is_kept = variance == 0.0 && b.covariance[[i, i]] == 0.0;
+        is_kept || (other[i] - at[i]).powi(2) <= sigmas.powi(2) * variance
+    })
 }
 
 /// The wakes of those ends of rough fits that lead to different ends, the best first, but for those that are hopeless.
-pub(crate) fn rivals(mut ends: Vec<MapFit>) -> Vec<Wake> {
+pub(crate) fn rivals(ends: &[MapFit]) -> Vec<Wake> {
+    let mut ends: Vec<&MapFit> = ends.iter().collect();
     ends.sort_by(|a, b| chi2(a).total_cmp(&chi2(b)));
-    let hopeless = ends.first().map_or(f64::INFINITY, chi2) + HOPELESS_OF_ESTIMATES;
+    let hopeless = ends.first().map_or(f64::INFINITY, |end| chi2(end)) + HOPELESS_OF_ESTIMATES;
     ends.retain(|end| chi2(end) <= hopeless);
     distinct(ends, |better, end| same(better, end, ONE_SIGMAS))
         .into_iter()
@@ -150,7 +152,7 @@ fn merged(mut ends: Vec<MapFit>) -> Option<MapFit> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vortex_fit::{PARAMETERS, Top};
+    use crate::vortex_fit::{Parameter, Top};
     use ndarray::Array2;
 
     /// An end at so many errors of its first circulation from 400 m^2/s.
@@ -182,14 +184,31 @@ mod tests {
     }
 
     #[test]
+    fn what_both_of_two_ends_keep_does_not_tell_them_apart() {
+        let core = Parameter::LeftCore as usize;
+        let mut kept = end(0.0, 0.0);
+        kept.covariance[[core, core]] = 0.0;
+        let mut other = kept.clone();
+        other.wake.left.core_radius_m = 3.0;
+        assert!(same(&kept, &other, SAME_SIGMAS));
+        other.wake.left.circulation_m2_s += 4.0;
+        assert!(!same(&kept, &other, SAME_SIGMAS));
+        let mut fitted = kept.clone();
+        fitted.wake.left.core_radius_m = 3.0;
+        fitted.covariance[[core, core]] = 1.0;
+        assert!(!same(&kept, &fitted, ONE_SIGMAS));
+        assert!(same(&fitted, &kept, ONE_SIGMAS));
+    }
+
+    #[test]
     fn ends_are_followed_that_differ_from_better_ones_and_are_not_hopeless() {
         let ends = [end(6.0, 25.0), end(3.0, 19.0), end(0.5, 2.0), end(0.0, 0.0)];
-        let kept: Vec<f64> = rivals(ends.to_vec())
+        let kept: Vec<f64> = rivals(&ends)
             .iter()
             .map(|wake| (wake.left.circulation_m2_s - 400.0) / 10.0)
             .collect();
         assert_eq!(kept, [0.0, 3.0]);
         // alone it is followed, however large its chi-square is
-        assert_eq!(rivals(ends[..1].to_vec()).len(), 1);
+        assert_eq!(rivals(&ends[..1]).len(), 1);
     }
 }

@@ -3,7 +3,7 @@
 //! A free number moves one parameter or two by the same amount; derivatives are summed accordingly.
 //! Check: spreading a step and gathering a gradient are transposes of each other.
 
-use ndarray::Array2;
+use ndarray::{Array1, Array2};
 
 use crate::vortex_fit::{PARAMETERS, Wake};
 
@@ -124,6 +124,11 @@ impl FreeParameters {
         }
         Wake::from_array(&p)
     }
+}
+
+/// A step of the free numbers, from that of all parameters.
+pub(crate) fn free_numbers(step: &[f64], groups: &[Vec<usize>]) -> Array1<f64> {
+    groups.iter().map(|group| step[group[0]]).collect()
 }
 
 /// Parameters after a step of the free numbers.
