@@ -173,3 +173,39 @@ impl Prediction for Linear {
         self.here.velocity_m_s.clone()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A circulation known to 40 m^2/s, of 400 with steps of 4: slopes serve for an error, and where errors are small for three steps.
+    #[test]
+    fn slopes_serve_for_less_than_a_standard_error_or_for_a_few_steps() {
+        let at = Wake::from_array(&[
+            400.0, 400.0, 376.5, 45.0, 423.5, 45.0, 2.0, 2.0, 0.0, 0.0, 0.0,
+        ])
+        .to_array()
+        .to_vec();
+        let velocity_m_s = Array2::zeros((1, 1));
+        let linear = Linear {
+            here: Predicted {
+                slopes: vec![velocity_m_s.clone()],
+                velocity_m_s,
+            },
+            slopes_at: at.clone(),
+            at: at.clone(),
+            groups: vec![vec![0]],
+            cells: Vec::new(),
+            scale: 1.0,
+            counted: 2.0,
+        };
+        let serves_after = |away_m2_s: f64, error_m2_s: f64| {
+            let mut p = at.clone();
+            p[0] += away_m2_s;
+            // two velocities count as one
+            linear.serves(&p, &Array2::from_elem((1, 1), 2.0 / error_m2_s.powi(2)))
+        };
+        assert!(serves_after(39.0, 40.0) && !serves_after(41.0, 40.0));
+        assert!(serves_after(11.0, 1.0) && !serves_after(13.0, 1.0));
+    }
+}
