@@ -443,7 +443,7 @@ fn a_pair_in_a_narrow_sector_is_found() {
 
 #[test]
 fn a_narrow_sector_without_vortices_holds_no_wake() {
-    // About one empty scan in 150 has a wake: this seed has none in eight.
+    // 3 of 480 empty scans had a wake: this seed has none in eight.
     let empty = NARROW.replace("[flow]\n", "[flow]\ncirculation_m2_s = 0.01\n");
     let rows = retrieved_rows(&(empty.replace("seed = 3", "seed = 11") + "[retrieval]\n"));
     assert!(

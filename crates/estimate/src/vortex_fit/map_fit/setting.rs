@@ -147,7 +147,7 @@ impl Setting<'_, '_> {
         self.outcome_of(&self.descent(start, &groups, stop, None)?.0)
     }
 
-    /// The end of steps of Gauss and Newton, with so many velocities counted as one or as many as the residuals say.
+    /// The end of steps of Gauss and Newton. How many velocities count as one is given or taken from the residuals.
     pub(crate) fn settled(
         &self,
         start: Vec<f64>,
