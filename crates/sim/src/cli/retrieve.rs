@@ -159,11 +159,17 @@ impl RetrieveArgs {
         }
     }
 
-    /// A scene with what is stated, else with what the file says, else with the defaults, at a high signal-to-noise ratio.
+    /// A scene with what is stated, else with what the file says, else with the defaults, at a signal-to-noise ratio of 10 dB in
+    /// 50 MHz, which is 4 dB in the wide band of stated estimators. Periodograms show the same velocities at any ratio; the likelihood
+    /// and pulse pairs do not.
     fn stated_scene(&self, scan: &ReadScan) -> Result<SceneFile, Error> {
+        let snr_db = match self.estimator {
+            Some(_) => 4.0,
+            None => 10.0,
+        };
         let mut keys = vec![
             ("detector.snr.reference", "\"fixed\"".to_owned()),
-            ("detector.snr.snr_db", "10.0".to_owned()),
+            ("detector.snr.snr_db", format!("{snr_db:?}")),
         ];
         if let Some(width_s) = scan.pulse_width_s {
             keys.push(("pulse.shape.duration_s", format!("{width_s:?}")));
