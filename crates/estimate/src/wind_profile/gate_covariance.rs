@@ -5,7 +5,8 @@
 //! ```
 //!
 //! Beams less than 0.1 rad apart count as parallel: the weights of both gates are one Gaussian of sqrt(2) times the standard deviation, and the
-//! covariance depends on the distances s along and y across the mean direction alone. It is tabulated over (sqrt s, sqrt y).
+//! covariance depends on the distances s along and y across the mean direction alone. It is tabulated over (sqrt s, sqrt y). The cosine of
+//! their angle, by which it is smaller, leaves no step at 0.1 rad, which could make a covariance matrix indefinite.
 //! Other beams take seven Gauss-Hermite nodes along each gate, or three where the gates are far apart.
 //! Check: tables by an independent quadrature in `tests/reference/wind`.
 
@@ -152,7 +153,8 @@ impl GateCovariance {
         for (d, mean) in mean.iter_mut().enumerate() {
             *mean = a.direction[d] + b.direction[d];
         }
-        let is_parallel = dot(a.direction, b.direction) > PARALLEL_RAD.cos();
+        let cosine = dot(a.direction, b.direction);
+        let is_parallel = cosine > PARALLEL_RAD.cos();
         if !self.has_tables || !is_parallel {
             self.wide_into(apart_m, a.direction, b.direction, out_m2_s2);
             return;
@@ -163,7 +165,7 @@ impl GateCovariance {
         let across_root = across_m.sqrt();
         for (scale, out) in self.scales.iter().zip(out_m2_s2) {
             let table = scale.parallel.as_ref();
-            *out = table.map_or(0.0, |table| table.at(along_root, across_root));
+            *out = table.map_or(0.0, |table| cosine * table.at(along_root, across_root));
         }
     }
 
@@ -376,6 +378,35 @@ fn correlation_along(correlation: &Correlation, per_w: f64, across_m: f64, posit
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// On either side of the angle from which beams are not parallel: a step of half a per cent of the variance, without the cosine, makes the
+    /// covariance of some hundred gates in strong turbulence indefinite.
+    #[test]
+    fn beams_that_count_as_parallel_have_the_covariance_of_those_that_do_not() {
+        let covariance = GateCovariance::new(14.0, &[30.0, 300.0], 1000.0).unwrap();
+        let at = |angle_rad: f64, position_m: [f64; 3]| {
+            let own = GatePosition {
+                position_m: [0.0; 3],
+                direction: [0.0, 0.0, 1.0],
+            };
+            let other = GatePosition {
+                position_m,
+                direction: [angle_rad.sin(), 0.0, angle_rad.cos()],
+            };
+            let mut out = [0.0; 2];
+            covariance.covariance_into(&own, &other, &mut out);
+            out
+        };
+        let own = at(0.0, [0.0; 3]);
+        for position_m in [[20.0, 0.0, 0.0], [40.0, 0.0, 30.0], [5.0, 20.0, 60.0]] {
+            let parallel = at(PARALLEL_RAD * (1.0 - 1e-9), position_m);
+            let wide = at(PARALLEL_RAD * (1.0 + 1e-9), position_m);
+            for scale in 0..2 {
+                let step = (parallel[scale] - wide[scale]).abs() / own[scale];
+                assert!(step < 1e-3, "{position_m:?}: {step}");
+            }
+        }
+    }
 
     /// On either side of the distance from which beams that are not parallel take three nodes.
     #[test]
