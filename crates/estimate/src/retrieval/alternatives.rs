@@ -85,11 +85,13 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
     let variance = report.scale.powi(2) * alike;
     let most = end.chi2 + NEGLIGIBLE * variance;
     // where the curvature of an end tells nothing, those of the others do
-    all.extend(
-        other_spacings(report, end, most)
-            .into_iter()
-            .filter_map(|end| Alternative::new(report, end).ok()),
-    );
+    if report.stage.options.other_spacings {
+        all.extend(
+            other_spacings(report, end, most)
+                .into_iter()
+                .filter_map(|end| Alternative::new(report, end).ok()),
+        );
+    }
     let spacings = all.len();
     if report.stage.options.other_profile {
         all.extend(of_other_profile(report, end, most)?);

@@ -10,7 +10,7 @@
 use crate::error::Error;
 use crate::retrieval::aliases::Unfolded;
 use crate::retrieval::estimates::fit_estimates;
-use crate::retrieval::gate_means::{fit_among_outliers, fit_means};
+use crate::retrieval::gate_means::{fit_among_outliers, fit_means, fit_once};
 use crate::retrieval::secondary::with_secondary_vortices;
 use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, Turbulence, Velocities};
 use crate::vortex_fit::Sharing;
@@ -47,11 +47,12 @@ pub fn fit_scan(
     let mut rough = RetrievalOptions {
         core_radius_m: None,
         other_profile: false,
+        other_spacings: false,
         turbulence: options.turbulence.filter(|air| *air != Turbulence::OfScan),
         ..options.clone()
     };
     rough.free.core_radius = Sharing::Fixed;
-    let found = fit_means(independent, &rough)?;
+    let found = fit_once(independent, &rough)?;
     let found = fit_among_outliers(independent, &rough, found)?;
     // Guesses and starts do not know that velocities repeat.
     let unfolded = match &found.wake {

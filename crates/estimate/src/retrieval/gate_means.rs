@@ -46,9 +46,7 @@ const SAME_PLACE_M: f64 = 3.0;
 /// # Errors
 /// As [`fit_scan`](crate::retrieval::fit_scan).
 pub(super) fn fit_means(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
-    options.validate()?;
-    map.validate()?;
-    let found = fit_in_winds(map, options)?;
+    let found = fit_once(map, options)?;
     let is_clear = found.vortices.len() == 2 && !is_doubtful(&found, options);
     if is_clear || options.movement != Movement::Auto || map.lasts_s() == 0.0 {
         return Ok(found);
@@ -62,6 +60,16 @@ pub(super) fn fit_means(map: &ScanMap, options: &RetrievalOptions) -> Result<Sca
     let least = found.statistic + RetrievalOptions::MOVES;
     let is_better = standing.wake.is_some() && standing.statistic > least;
     Ok(if is_better { standing } else { found })
+}
+
+/// The same by one search, in which vortices move unless the scan is short or they are stated to stand still.
+///
+/// # Errors
+/// As [`fit_scan`](crate::retrieval::fit_scan).
+pub(super) fn fit_once(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
+    options.validate()?;
+    map.validate()?;
+    fit_in_winds(map, options)
 }
 
 /// Whether a pair may be at rest though the fit lets it move. Cores that are fixed say nothing of that.

@@ -116,6 +116,8 @@ pub struct RetrievalOptions {
     pub model: WakeModel,
     /// Whether the cores may as well have the other profile: what its fit finds, by its likelihood, is part of the deviations.
     pub other_profile: bool,
+    /// Whether pairs with other spacings, which long gates do not tell apart, are part of the deviations, too.
+    pub other_spacings: bool,
     /// What a velocity is of the air about its range.
     pub gate: Gate,
     /// What may change.
@@ -176,6 +178,7 @@ impl Default for RetrievalOptions {
         Self {
             model: WakeModel::default(),
             other_profile: true,
+            other_spacings: true,
             gate: Gate::Point,
             free: FreeParameters {
                 wind: WindFit::LogLinear,

@@ -236,7 +236,11 @@ fn is_between(found: [f64; 2], expected: f64, tolerance: f64) -> bool {
 
 #[test]
 fn dissipation_and_noise_are_those_of_the_table_at_each_outer_scale() {
-    for expected in rows("edr_fit") {
+    // `edr_fit` takes the beams of the scan in elevation as parallel: up to 3 % of eps^(2/3), 0.3 of the likelihood.
+    let mut all = rows("edr_fit");
+    all.retain(|row| row.name != "rhi");
+    all.extend(rows("edr_fit_exact"));
+    for expected in all {
         let carried_m_s = [
             expected.at("advection_east_m_s"),
             expected.at("advection_north_m_s"),
