@@ -10,10 +10,12 @@ use crate::retrieval::{
     Flag, Movement, RetrievalOptions, ScanEstimator, ScanMap, ScanResult, VortexResult,
 };
 use crate::vortex_fit::map_fit::data::ends;
+use crate::vortex_fit::map_fit::secondary::LEAST_GAIN;
 use crate::vortex_fit::map_fit::starts::chi2;
 use crate::vortex_fit::{
-    EstimatorResponse, MapFit, MapFitOptions, VelocityMap, Wake, fit_map_of_estimator,
-    fit_secondary_vortices, refine_map_fit_of_estimator, with_local_circulations,
+    EstimatorResponse, MapFit, MapFitOptions, Secondary, VelocityMap, Wake, WakeModel,
+    fit_map_of_estimator, fit_secondary_vortices, gain_over_local_circulations,
+    refine_map_fit_of_estimator, with_local_circulations,
 };
 
 /// The fit to estimates in which means show `found`: of a pair, as means may show but one of its vortices or none and the other may be beyond the
@@ -203,6 +205,7 @@ impl EstimateFits<'_> {
         }
         let mut options = self.options.clone();
         let response = self.response(moves);
+        let mut local = self.with_local_circulations(&options.model, response, &fit);
         let four = fit_secondary_vortices(
             &self.view,
             &options.model,
@@ -214,18 +217,17 @@ impl EstimateFits<'_> {
         .flatten();
         let are_shown = four.as_ref().is_some_and(|(_, secondary)| secondary.shown);
         if let Some((Some(with_secondary), secondary)) = four {
-            fit = with_secondary;
-            options.model.secondary = Some(secondary.vortices);
+            let model = WakeModel {
+                secondary: Some(secondary.vortices),
+                ..options.model
+            };
+            let both = [(&model, &with_secondary.wake), (&options.model, &fit.wake)];
+            if local.is_none() || self.are_needed_nearby(response, both) {
+                local = self.with_local_circulations(&model, response, &with_secondary);
+                fit = with_secondary;
+                options.model = model;
+            }
         }
-        let local = with_local_circulations(
-            &self.view,
-            &options.model,
-            response,
-            &fit,
-            &self.map_options,
-        )
-        .ok()
-        .flatten();
         let are_local = local.is_some();
         let mut fit = local.unwrap_or(fit);
         if let Some(turbulent) = &turbulent {
@@ -238,6 +240,31 @@ impl EstimateFits<'_> {
         result.set(Flag::SecondaryVortices, are_shown);
         result.set(Flag::LocalCirculation, are_local);
         Ok(result)
+    }
+
+    /// The pair of a fit with the circulation of each vortex from what is near it, where that explains the map clearly better.
+    fn with_local_circulations(
+        &self,
+        model: &WakeModel,
+        response: &EstimatorResponse<'_>,
+        fit: &MapFit,
+    ) -> Option<MapFit> {
+        with_local_circulations(&self.view, model, response, fit, &self.map_options)
+            .ok()
+            .flatten()
+    }
+
+    /// Whether a pair with secondary vortices explains what is near its vortices so much better than the pair alone does with local circulations as
+    /// secondary vortices have to: else what is far away decides about the circulations.
+    fn are_needed_nearby(
+        &self,
+        response: &EstimatorResponse<'_>,
+        [four, pair]: [(&WakeModel, &Wake); 2],
+    ) -> bool {
+        let gain =
+            gain_over_local_circulations(&self.view, response, [four, pair], &self.map_options);
+        self.map_options.secondary == Secondary::Always
+            || gain.is_none_or(|gain| gain >= LEAST_GAIN)
     }
 
     /// A pair in turbulence that stands out of the noise: what else is in the air is part of that.

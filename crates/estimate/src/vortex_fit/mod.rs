@@ -41,8 +41,8 @@ pub(crate) mod wake;
 
 pub use map_fit::data::{Loss, MapFit, MapFitOptions, Secondary, VelocityMap};
 pub use map_fit::estimates::{
-    fit_map, fit_map_of_estimator, fit_secondary_vortices, refine_map_fit_of_estimator,
-    with_local_circulations,
+    fit_map, fit_map_of_estimator, fit_secondary_vortices, gain_over_local_circulations,
+    refine_map_fit_of_estimator, with_local_circulations,
 };
 pub use map_fit::estimator_response::EstimatorResponse;
 pub use map_fit::secondary::SecondaryVortices;

@@ -65,19 +65,21 @@ fn fits_near_the_ground(
     seed: u64,
     secondary: Secondary,
 ) -> (MapFit, Option<(Option<MapFit>, SecondaryVortices)>) {
-    let (model, options) = (
-        WakeModel::default(),
-        MapFitOptions {
-            correlated_lines: 2,
-            secondary,
-            ..Default::default()
-        },
-    );
+    let model = WakeModel::default();
+    let options = near_the_ground(secondary);
     of_peaks((grounded(), shown), (296.0, seed), |map, response| {
         let pair = fit_map_of_estimator(map, &model, response, &options).unwrap();
         let four = fit_secondary_vortices(map, &model, response, &pair.wake, &options).unwrap();
         (pair, four)
     })
+}
+
+fn near_the_ground(secondary: Secondary) -> MapFitOptions {
+    MapFitOptions {
+        correlated_lines: 2,
+        secondary,
+        ..Default::default()
+    }
 }
 
 /// The fit of a scan of means.
@@ -129,6 +131,29 @@ fn secondary_vortices_are_found_beside_their_vortices() {
         }
     }
     assert!(worst < 3.5 && missed > 2.0 * worst, "{worst} {missed}");
+}
+
+/// Near the vortices, too: a pair with winds of its own there does not explain the map as well. Where winds are all there is, secondary vortices
+/// explain it no better.
+#[test]
+fn secondary_vortices_explain_what_is_near_better_than_winds_do() {
+    let pair_model = WakeModel::default();
+    let four_model = WakeModel {
+        secondary: Some(secondary_of_grounded()),
+        ..pair_model
+    };
+    let options = near_the_ground(Secondary::Auto);
+    let gain = |shown: Option<[Vortex; 2]>| {
+        of_peaks((grounded(), shown), (296.0, 0), |map, response| {
+            let pair = fit_map_of_estimator(map, &pair_model, response, &options).unwrap();
+            let both = [(&four_model, &grounded()), (&pair_model, &pair.wake)];
+            gain_over_local_circulations(map, response, both, &options).unwrap()
+        })
+    };
+    let of_four = gain(Some(secondary_of_grounded()));
+    let of_pair = gain(None);
+    assert!(of_four > 200.0, "{of_four}");
+    assert!(of_pair < -100.0, "{of_pair}");
 }
 
 #[test]

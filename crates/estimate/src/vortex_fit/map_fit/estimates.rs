@@ -169,6 +169,29 @@ pub fn with_local_circulations(
     Ok(joined(pair, &local))
 }
 
+/// How much better a wake explains what is near each vortex of a pair than that pair does with a circulation of that vortex and a wind of its own
+/// there: the gain of the logarithm of the likelihood by both, with velocities that say the same counted once. Nothing where either fit fails.
+pub fn gain_over_local_circulations(
+    map: &VelocityMap<'_>,
+    response: &EstimatorResponse<'_>,
+    [(model, wake), (model_of_pair, pair)]: [(&WakeModel, &Wake); 2],
+    options: &MapFitOptions,
+) -> Option<f64> {
+    let mut gain = 0.0;
+    for (side, vortex) in [&pair.left, &pair.right].into_iter().enumerate() {
+        let near = near_vortex(map, model_of_pair, vortex);
+        let near = near.map();
+        let of_pair =
+            EstimatorPrediction::new(&near, model_of_pair, response, options, 1.0).ok()?;
+        let local = of_pair.setting().settled_nearby(pair, side, ESTIMATES)?;
+        let of_wake = EstimatorPrediction::new(&near, model, response, options, 1.0).ok()?;
+        let setting = of_wake.setting();
+        let shown = setting.linear(&wake.to_array(), &local.groups, None).ok()?;
+        gain += setting.gain(&shown, &local);
+    }
+    Some(gain)
+}
+
 /// What is near a vortex.
 pub(crate) fn near_vortex(map: &VelocityMap<'_>, model: &WakeModel, vortex: &Vortex) -> Coarse {
     Coarse::near(map, |line, gate| {

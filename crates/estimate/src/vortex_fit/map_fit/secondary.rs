@@ -31,7 +31,7 @@ const HIGHEST: f64 = 1.5;
 const GRID_OVER_HEIGHT: f64 = 0.12;
 /// Least gain of the logarithm of the likelihood by both, with velocities that say the same counted once: in the end by what is alike in the residuals
 /// of four vortices, in the search by the residuals of the pair, which are alike where it misses vortices.
-const LEAST_GAIN: f64 = 20.0;
+pub(crate) const LEAST_GAIN: f64 = 20.0;
 /// Numbers of the secondary vortices that are fitted.
 const NUMBERS: usize = 2 * SECONDARY_PARAMETERS;
 
