@@ -261,10 +261,9 @@ impl EstimateFits<'_> {
         response: &EstimatorResponse<'_>,
         [four, pair]: [(&WakeModel, &Wake); 2],
     ) -> bool {
-        let gain =
-            gain_over_local_circulations(&self.view, response, [four, pair], &self.map_options);
         self.map_options.secondary == Secondary::Always
-            || gain.is_none_or(|gain| gain >= LEAST_GAIN)
+            || gain_over_local_circulations(&self.view, response, [four, pair], &self.map_options)
+                .is_none_or(|gain| gain >= LEAST_GAIN)
     }
 
     /// A pair in turbulence that stands out of the noise: what else is in the air is part of that.

@@ -133,8 +133,7 @@ fn secondary_vortices_are_found_beside_their_vortices() {
     assert!(worst < 3.5 && missed > 2.0 * worst, "{worst} {missed}");
 }
 
-/// Near the vortices, too: a pair with winds of its own there does not explain the map as well. Where winds are all there is, secondary vortices
-/// explain it no better.
+/// Near the vortices, too: a pair with winds of its own there does not explain the map as well. Where there is a pair alone they explain it worse.
 #[test]
 fn secondary_vortices_explain_what_is_near_better_than_winds_do() {
     let pair_model = WakeModel::default();

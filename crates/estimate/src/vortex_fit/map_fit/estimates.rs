@@ -170,13 +170,16 @@ pub fn with_local_circulations(
 }
 
 /// How much better a wake explains what is near each vortex of a pair than that pair does with a circulation of that vortex and a wind of its own
-/// there: the gain of the logarithm of the likelihood by both, with velocities that say the same counted once. Nothing where either fit fails.
+/// there: the gain of the logarithm of the likelihood by both, with velocities that say the same counted once. Nothing where either fit fails or the input is impossible.
 pub fn gain_over_local_circulations(
     map: &VelocityMap<'_>,
     response: &EstimatorResponse<'_>,
     [(model, wake), (model_of_pair, pair)]: [(&WakeModel, &Wake); 2],
     options: &MapFitOptions,
 ) -> Option<f64> {
+    map.validate().ok()?;
+    wake.validate().ok()?;
+    pair.validate().ok()?;
     let mut gain = 0.0;
     for (side, vortex) in [&pair.left, &pair.right].into_iter().enumerate() {
         let near = near_vortex(map, model_of_pair, vortex);
